@@ -1,0 +1,1 @@
+"""Isotropic remeshing of triangle meshes."""

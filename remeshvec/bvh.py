@@ -1,0 +1,112 @@
+"""Bounding-volume tree over the reference surface, and its closest point with a hint.
+
+The faces come in Morton order, so the tree needs no construction: leaves are runs of faces, every
+level groups four boxes of the one below. A query starts from the distance to the face found last time,
+so that nearly every box on the way down is skipped.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from ._jit import driver, inlined
+from ._types import FloatArray, IndexArray, Tree
+from .geometry import closest_on_triangle
+
+__all__ = ["build_tree", "closest_face"]
+
+_LEAF = 4  # faces in a leaf
+_ARITY = 4  # boxes in a node
+_STACK = 64  # boxes waiting: 3 a level and 16 levels hold 4e9 leaves
+
+
+def build_tree(X: FloatArray, F: IndexArray, parallel: bool) -> Tree:
+    """Build the tree over faces in Morton order; ``X`` is (n, 3 or 4), ``F`` (m, 3)."""
+    counts = [-(-len(F) // _LEAF)]
+    while counts[-1] > 1:
+        counts.append(-(-counts[-1] // _ARITY))
+    level = np.zeros(len(counts) + 1, np.int64)
+    level[1:] = np.cumsum(counts)
+    corners = np.empty((len(F), 9))
+    boxes = np.empty((int(level[-1]), 6))
+    _fill_leaves(parallel, X, F, corners, boxes)
+    for i in range(1, len(counts)):
+        _fill_level(boxes, level[i - 1], level[i], level[i + 1])
+    return Tree(corners, boxes, level)
+
+
+@driver
+def _fill_leaves(X, F, corners, boxes):  # type: ignore[no-untyped-def]
+    for leaf in prange(-(-F.shape[0] // _LEAF)):
+        for i in range(3):
+            boxes[leaf, i] = np.inf
+            boxes[leaf, 3 + i] = -np.inf
+        for f in range(_LEAF * leaf, min(_LEAF * leaf + _LEAF, F.shape[0])):
+            for c in range(3):
+                for i in range(3):
+                    x = X[F[f, c], i]
+                    corners[f, 3 * c + i] = x
+                    boxes[leaf, i] = min(boxes[leaf, i], x)
+                    boxes[leaf, 3 + i] = max(boxes[leaf, 3 + i], x)
+
+
+def _fill_level(boxes: FloatArray, below: int, start: int, end: int) -> None:
+    """Boxes of one level as unions of the level below."""
+    groups = np.arange(below, start, _ARITY)
+    boxes[start:end, :3] = np.minimum.reduceat(boxes[:start, :3], groups, axis=0)
+    boxes[start:end, 3:] = np.maximum.reduceat(boxes[:start, 3:], groups, axis=0)
+
+
+@inlined
+def _box_distance(boxes, i, x, y, z):  # type: ignore[no-untyped-def]
+    """Squared distance from a point to a box."""
+    dx = max(boxes[i, 0] - x, 0.0, x - boxes[i, 3])
+    dy = max(boxes[i, 1] - y, 0.0, y - boxes[i, 4])
+    dz = max(boxes[i, 2] - z, 0.0, z - boxes[i, 5])
+    return dx * dx + dy * dy + dz * dz
+
+
+@inlined
+def face_distance(corners, f, x, y, z):  # type: ignore[no-untyped-def]
+    """Barycentric weights of corners 1 and 2 of the closest point of a face; squared distance."""
+    return closest_on_triangle(
+        x, y, z,
+        corners[f, 0], corners[f, 1], corners[f, 2],
+        corners[f, 3], corners[f, 4], corners[f, 5],
+        corners[f, 6], corners[f, 7], corners[f, 8],
+    )  # fmt: skip
+
+
+@inlined
+def closest_face(tree, x, y, z, hint, node, depth):  # type: ignore[no-untyped-def]
+    """Face closest to a point, with weights of its corners 1 and 2 and the squared distance.
+
+    Ties go to the hint, then to the smaller index, so that the answer does not depend on the path.
+    ``node`` and ``depth`` are (64,) int64 scratch.
+    """
+    best = hint
+    s, t, distance = face_distance(tree.corners, hint, x, y, z)
+    top = tree.level.size - 2
+    node[0] = 0
+    depth[0] = top
+    size = 1
+    while size > 0:
+        size -= 1
+        i = node[size]
+        d = depth[size]
+        if d == 0:
+            for f in range(_LEAF * i, min(_LEAF * i + _LEAF, tree.corners.shape[0])):
+                if f != hint:
+                    fs, ft, fd = face_distance(tree.corners, f, x, y, z)
+                    if fd < distance:
+                        best, s, t, distance = f, fs, ft, fd
+            continue
+        start = tree.level[d - 1]
+        end = min(start + _ARITY * i + _ARITY, tree.level[d])
+        for j in range(start + _ARITY * i, end):
+            if _box_distance(tree.boxes, j, x, y, z) < distance:
+                node[size] = j - start
+                depth[size] = d - 1
+                size += 1
+    return best, s, t, distance

@@ -1,0 +1,102 @@
+"""Conflict-free edge sets: which edges may change at the same time.
+
+Two operations conflict when their footprints share a vertex (flip: the four vertices of the quad;
+collapse: the closed one-rings of both ends; moving a vertex: its closed one-ring). The arrays are
+cut into blocks whose number depends on the size of the mesh only, and a phase runs three stages:
+
+* ``OWNED``: a block takes the candidates whose whole footprint lies in its own vertex range. Sets
+  of different blocks cannot conflict: blocks run in parallel, each in order, in place.
+* ``SHIFTED``: the same over blocks shifted by half a block, for what straddled a border.
+* ``REST``: what is left, about 2 %, on one thread.
+
+So the result is that of one fixed sequence, however many threads run it, and no edge is frozen at a
+border. Independent sets by rounds [Luby 1986] cost 4 to 10 times the work and were dropped.
+
+A candidate list is one array with a slot range a face block; a stage sets what it has dealt with to
+``DONE``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._jit import inlined
+from ._types import Blocks, Mesh
+
+__all__ = [
+    "DONE",
+    "OWNED",
+    "REST",
+    "SHIFTED",
+    "list_range",
+    "make_blocks",
+    "stage_blocks",
+    "stages",
+    "vertex_range",
+]
+
+OWNED = 0
+SHIFTED = 1
+REST = 2
+
+DONE = -1
+
+# Faces in a block. Smaller blocks balance better over threads, but 8 % of the edges straddle a
+# border at 16,384 faces, 12 % at 8,192; below 1.5 blocks a mesh is one block and has no border.
+FACES_PER_BLOCK = 12288
+
+
+def make_blocks(mesh: Mesh) -> Blocks:
+    """Cut faces into even ranges and vertices into the ranges that these faces own.
+
+    In the order that `split` and `order` leave, vertices follow the half-edge that owns them. Range k
+    of the vertices then belongs to range k of the faces; what does not fit is left to later stages.
+    """
+    n_faces = mesh.origin.size // 3
+    count = max(1, round(n_faces / FACES_PER_BLOCK))
+    face = (np.arange(count + 1, dtype=np.int64) * n_faces) // count
+    vertex = np.zeros(count + 1, np.int64)
+    vertex[count] = mesh.vertex_halfedge.size
+    for k in range(1, count):
+        h = 3 * int(face[k])
+        while h < mesh.origin.size and mesh.vertex_halfedge[mesh.origin[h]] != h:
+            h += 1
+        vertex[k] = mesh.origin[h] if h < mesh.origin.size else vertex[count]
+    return Blocks(face, np.maximum.accumulate(vertex))
+
+
+def stages(blocks: Blocks) -> tuple[int, ...]:
+    """Stages that a mesh of so many blocks needs; a single block owns everything."""
+    return (OWNED, SHIFTED, REST) if len(blocks.face) > 2 else (OWNED,)
+
+
+@inlined
+def stage_blocks(blocks, stage):  # type: ignore[no-untyped-def]
+    """Count the blocks that a stage runs in parallel."""
+    count = blocks.face.size - 1
+    if stage == OWNED:
+        return count
+    return count - 1 if stage == SHIFTED else 1
+
+
+@inlined
+def vertex_range(blocks, stage, k):  # type: ignore[no-untyped-def]
+    """Vertices that block ``k`` of a stage may touch."""
+    last = blocks.vertex.size - 1
+    if stage == OWNED:
+        return blocks.vertex[k], blocks.vertex[k + 1]
+    if stage == SHIFTED:
+        low = (blocks.vertex[k] + blocks.vertex[k + 1]) // 2
+        high = (blocks.vertex[k + 1] + blocks.vertex[k + 2]) // 2
+        return low, high
+    return np.int64(0), blocks.vertex[last]
+
+
+@inlined
+def list_range(blocks, stage, k):  # type: ignore[no-untyped-def]
+    """Candidate lists (first, end) that block ``k`` of a stage reads."""
+    if stage == OWNED:
+        return k, k + 1
+    if stage == SHIFTED:
+        return k, k + 2
+    return np.int64(0), blocks.face.size - 1

@@ -1,0 +1,163 @@
+"""Formulas on scalars: lengths, normals, Voronoi areas, shape, closest points.
+
+Scalars in, scalars out, no Python objects: the same source could be compiled for a GPU.
+Kernels index coordinates as ``X[v, 0..2]``.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from ._jit import inlined
+
+__all__ = [
+    "angle_from_cosine",
+    "closest_on_segment",
+    "closest_on_triangle",
+    "distance_squared",
+    "face_vector",
+    "mean_ratio",
+    "mixed_voronoi_areas",
+    "turn_exceeds",
+]
+
+
+@inlined
+def distance_squared(X, a, b):  # type: ignore[no-untyped-def]
+    """Squared length of the edge a-b; the same bits in both directions."""
+    x = X[a, 0] - X[b, 0]
+    y = X[a, 1] - X[b, 1]
+    z = X[a, 2] - X[b, 2]
+    return x * x + y * y + z * z
+
+
+@inlined
+def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):  # type: ignore[no-untyped-def]
+    """Twice the area times the unit normal of the triangle a, b, c."""
+    ux = bx - ax
+    uy = by - ay
+    uz = bz - az
+    wx = cx - ax
+    wy = cy - ay
+    wz = cz - az
+    return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+
+
+@inlined
+def turn_exceeds(ux, uy, uz, wx, wy, wz, cosine):  # type: ignore[no-untyped-def]
+    """Tell whether the angle between two vectors exceeds ``acos(cosine)``, ``cosine >= 0``.
+
+    A zero ``w`` always exceeds; no square root is taken.
+    """
+    dot = ux * wx + uy * wy + uz * wz
+    if dot <= 0.0:
+        return True
+    norms = (ux * ux + uy * uy + uz * uz) * (wx * wx + wy * wy + wz * wz)
+    return dot * dot < cosine * cosine * norms
+
+
+@inlined
+def mean_ratio(l0, l1, l2, double_area):  # type: ignore[no-untyped-def]
+    """Shape of a triangle from squared lengths: 1 equilateral, 0 degenerate.
+
+    ``4 sqrt(3) area / (sum of squared edge lengths)`` [Bank and Smith 1997].
+    """
+    total = l0 + l1 + l2
+    if total <= 0.0:
+        return 0.0
+    return 3.4641016151377544 * double_area / total
+
+
+@inlined
+def mixed_voronoi_areas(l0, l1, l2, double_area):  # type: ignore[no-untyped-def]
+    """Split a triangle's area among its corners [Meyer et al. 2003, section 3.3].
+
+    ``l0, l1, l2`` are the squared lengths of the edges opposite corners 0, 1, 2.
+    """
+    quarter = 0.125 * double_area
+    if l0 > l1 + l2:
+        return 2.0 * quarter, quarter, quarter
+    if l1 > l2 + l0:
+        return quarter, 2.0 * quarter, quarter
+    if l2 > l0 + l1:
+        return quarter, quarter, 2.0 * quarter
+    if double_area <= 0.0:
+        return 0.0, 0.0, 0.0
+    # cot_i = (l_j + l_k - l_i) / (4 area); each corner gets (l_j cot_j + l_k cot_k) / 8.
+    scale = 0.0625 / double_area
+    w0 = scale * l0 * (l1 + l2 - l0)
+    w1 = scale * l1 * (l2 + l0 - l1)
+    w2 = scale * l2 * (l0 + l1 - l2)
+    return w1 + w2, w2 + w0, w0 + w1
+
+
+@inlined
+def angle_from_cosine(cosine):  # type: ignore[no-untyped-def]
+    """Angle in [0, pi], to 7e-5 rad [Abramowitz and Stegun 1964, 4.4.45].
+
+    Only for weights: a true ``acos`` would take half of the time of a relaxation.
+    """
+    x = abs(cosine)
+    if x > 1.0:
+        x = 1.0
+    angle = sqrt(1.0 - x) * (1.5707288 + x * (-0.2121144 + x * (0.0742610 - 0.0187293 * x)))
+    return 3.141592653589793 - angle if cosine < 0.0 else angle
+
+
+@inlined
+def closest_on_segment(px, py, pz, ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
+    """Parameter in [0, 1] of the point of a-b closest to p, and the squared distance."""
+    ux = bx - ax
+    uy = by - ay
+    uz = bz - az
+    length = ux * ux + uy * uy + uz * uz
+    s = 0.0
+    if length > 0.0:
+        s = ((px - ax) * ux + (py - ay) * uy + (pz - az) * uz) / length
+        s = min(max(s, 0.0), 1.0)
+    x = px - (ax + s * ux)
+    y = py - (ay + s * uy)
+    z = pz - (az + s * uz)
+    return s, x * x + y * y + z * z
+
+
+@inlined
+def closest_on_triangle(px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz):  # type: ignore[no-untyped-def]
+    """Barycentric weights of b and c of the closest point, and the squared distance.
+
+    By regions as in Ericson [2005, section 5.1.5]; a triangle without area falls back on its edges.
+    """
+    ux = bx - ax
+    uy = by - ay
+    uz = bz - az
+    wx = cx - ax
+    wy = cy - ay
+    wz = cz - az
+    qx = px - ax
+    qy = py - ay
+    qz = pz - az
+    uu = ux * ux + uy * uy + uz * uz
+    uw = ux * wx + uy * wy + uz * wz
+    ww = wx * wx + wy * wy + wz * wz
+    qu = qx * ux + qy * uy + qz * uz
+    qw = qx * wx + qy * wy + qz * wz
+    determinant = uu * ww - uw * uw
+    s = ww * qu - uw * qw
+    t = uu * qw - uw * qu
+    # 1e-14: below this share the two edge vectors are parallel to working precision.
+    if s >= 0.0 and t >= 0.0 and s + t <= determinant and determinant > 1e-14 * uu * ww:
+        s /= determinant
+        t /= determinant
+        x = qx - s * ux - t * wx
+        y = qy - s * uy - t * wy
+        z = qz - s * uz - t * wz
+        return s, t, x * x + y * y + z * z
+    best_s, best = closest_on_segment(px, py, pz, ax, ay, az, bx, by, bz)
+    best_t = 0.0
+    r, d = closest_on_segment(px, py, pz, ax, ay, az, cx, cy, cz)
+    if d < best:
+        best_s, best_t, best = 0.0, r, d
+    r, d = closest_on_segment(px, py, pz, bx, by, bz, cx, cy, cz)
+    if d < best:
+        best_s, best_t, best = 1.0 - r, r, d
+    return best_s, best_t, best

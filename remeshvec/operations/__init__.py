@@ -1,0 +1,1 @@
+"""The four phases and the projection, one a file, all with the same anatomy."""

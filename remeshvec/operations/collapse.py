@@ -1,0 +1,391 @@
+"""Collapse short edges, where every guard agrees.
+
+Candidates are the edges below the limit, in the order of the arrays (sorting them by length gains
+nothing). A collapse removes one end and moves the other to the midpoint or to the quadric point; it
+owns the closed one-rings of both ends. Guards: boundary, link condition, overshoot, foldover, sliver.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+
+from .._jit import driver, inlined
+from .._types import DEAD, FIXED, INNER, NONE, Blocks, Mesh
+from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
+from ..geometry import distance_squared, face_vector, mean_ratio, turn_exceeds
+from ..halfedge import following, previous
+
+__all__ = ["CollapseLimits", "collapse_short_edges"]
+
+# Outcomes of one candidate, and columns of the tally.
+COLLAPSED = 0
+OUTSIDE = 1
+GONE = 2
+KEPT_BOUNDARY = 3
+KEPT_LINK = 4
+KEPT_OVERSHOOT = 5
+KEPT_FOLDOVER = 6
+KEPT_SLIVER = 7
+N_OUTCOMES = 8
+
+# Edges at hubs with more spokes stay; collapses along the rim bring the valence down first.
+RING_CAPACITY = 128
+
+# Pull of the quadric point towards the midpoint, as a share of the planes' weight: without it flat
+# regions have no minimum.
+_REGULARISER = 0.03
+
+
+class CollapseLimits(NamedTuple):
+    """What a collapse may do; lengths in the mesh's units."""
+
+    shortest: float  # edges below are candidates
+    longest: float  # no edge may become longer
+    foldover_cosine: float  # cosine of the largest turn of a face normal
+    quadric_reach: float  # largest distance of the quadric point from the midpoint; 0: midpoint
+    sliver_check: bool  # the worst triangle must not get worse
+
+
+def collapse_short_edges(
+    mesh: Mesh, blocks: Blocks, limits: CollapseLimits, parallel: bool
+) -> np.ndarray:
+    """Collapse edges shorter than ``limits.shortest``; returns counts by outcome."""
+    candidates = np.empty(mesh.origin.size, np.int32)
+    count = np.zeros(len(blocks.face) - 1, np.int64)
+    _find_short_edges(parallel, mesh, blocks, limits.shortest**2, candidates, count)
+    tally = np.zeros((len(count), N_OUTCOMES), np.int64)
+    if count.any():
+        for stage in stages(blocks):
+            tally[:, OUTSIDE] = 0
+            _collapse(parallel, mesh, blocks, stage, limits, candidates, count, tally)
+    return tally.sum(axis=0)
+
+
+@driver
+def _find_short_edges(mesh, blocks, shortest_squared, candidates, count):  # type: ignore[no-untyped-def]
+    for k in prange(blocks.face.size - 1):
+        end = 3 * blocks.face[k]
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            a = mesh.origin[3 * f]
+            if a == DEAD:
+                continue
+            b = mesh.origin[3 * f + 1]
+            c = mesh.origin[3 * f + 2]
+            l0 = distance_squared(mesh.X, a, b)
+            l1 = distance_squared(mesh.X, b, c)
+            l2 = distance_squared(mesh.X, c, a)
+            # Stores without branches: whether an edge is short cannot be predicted.
+            h = 3 * f
+            candidates[end] = h
+            end += (l0 < shortest_squared) & (mesh.twin[h] < h)
+            candidates[min(end, h + 1)] = h + 1
+            end += (l1 < shortest_squared) & (mesh.twin[h + 1] < h + 1)
+            candidates[min(end, h + 2)] = h + 2
+            end += (l2 < shortest_squared) & (mesh.twin[h + 2] < h + 2)
+        count[k] = end - 3 * blocks.face[k]
+
+
+@driver
+def _collapse(mesh, blocks, stage, limits, candidates, count, tally):  # type: ignore[no-untyped-def]
+    for k in prange(stage_blocks(blocks, stage)):
+        low, high = vertex_range(blocks, stage, k)
+        first, end = list_range(blocks, stage, k)
+        faces = np.empty((2, RING_CAPACITY), np.int64)
+        ring = np.empty((2, RING_CAPACITY), np.int64)
+        for j in range(first, end):
+            for i in range(3 * blocks.face[j], 3 * blocks.face[j] + count[j]):
+                h = np.int64(candidates[i])
+                if h == DONE:
+                    continue
+                v = mesh.origin[h]
+                if v < low or v >= high:  # another block's, or DEAD
+                    continue
+                outcome = _collapse_edge(mesh, h, low, high, limits, faces, ring)
+                tally[k, outcome] += 1
+                if outcome != OUTSIDE:
+                    candidates[i] = DONE
+
+
+@inlined
+def _collapse_edge(mesh, h, low, high, limits, faces, ring):  # type: ignore[no-untyped-def]
+    """Collapse one edge if every guard agrees; returns the outcome."""
+    a = np.int64(mesh.origin[h])
+    b = np.int64(mesh.origin[following(h)])
+    if b < low or b >= high:
+        return OUTSIDE
+    if not distance_squared(mesh.X, a, b) < limits.shortest * limits.shortest:
+        return GONE
+    if not keeps_boundary(mesh, h, a, b):
+        return KEPT_BOUNDARY
+    n_a, m_a = walk_ring(mesh, a, low, high, faces[0], ring[0])
+    n_b, m_b = walk_ring(mesh, b, low, high, faces[1], ring[1])
+    if n_a == 0 or n_b == 0:
+        return OUTSIDE
+    if n_a < 0 or n_b < 0:
+        return KEPT_LINK
+    if not keeps_link(mesh, h, ring[0], n_a, m_a, ring[1], n_b, m_b):
+        return KEPT_LINK
+    x, y, z = _position(mesh, a, b, limits.quadric_reach, faces, n_a, n_b)
+    limit = limits.longest * limits.longest
+    if overshoots(mesh.X, x, y, z, b, ring[0], m_a, limit) or overshoots(
+        mesh.X, x, y, z, a, ring[1], m_b, limit
+    ):
+        return KEPT_OVERSHOOT
+    cosine = limits.foldover_cosine
+    if folds_over(mesh, x, y, z, b, faces[0], n_a, cosine) or folds_over(
+        mesh, x, y, z, a, faces[1], n_b, cosine
+    ):
+        return KEPT_FOLDOVER
+    if limits.sliver_check and makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
+        return KEPT_SLIVER
+    _remove_edge(mesh, h, a, b, x, y, z, faces, n_a, n_b)
+    return COLLAPSED
+
+
+@inlined
+def keeps_boundary(mesh, h, a, b):  # type: ignore[no-untyped-def]
+    """Guard: fixed vertices stay, and no inner edge joins two parts of the boundary.
+
+    A boundary edge may go unless its face hangs on it alone.
+    """
+    if mesh.kind[a] == FIXED and mesh.kind[b] == FIXED:
+        return False
+    on_a = mesh.twin[mesh.vertex_halfedge[a]] == NONE
+    on_b = mesh.twin[mesh.vertex_halfedge[b]] == NONE
+    if mesh.twin[h] != NONE:
+        return not (on_a and on_b)
+    return mesh.twin[following(h)] != NONE or mesh.twin[previous(h)] != NONE
+
+
+@inlined
+def walk_ring(mesh, v, low, high, faces, ring):  # type: ignore[no-untyped-def]
+    """List outgoing half-edges and ring vertices of ``v``.
+
+    Returns both counts; (0, 0) where a ring vertex lies outside the range, (-1, -1) where there are
+    too many. Only faces at ``v`` are read, which no other block can change.
+    """
+    start = np.int64(mesh.vertex_halfedge[v])
+    h = start
+    for i in range(RING_CAPACITY - 1):
+        w = np.int64(mesh.origin[following(h)])
+        if w < low or w >= high:
+            return 0, 0
+        faces[i] = h
+        ring[i] = w
+        p = previous(h)
+        t = np.int64(mesh.twin[p])
+        if t == NONE:
+            w = np.int64(mesh.origin[p])
+            if w < low or w >= high:
+                return 0, 0
+            ring[i + 1] = w
+            return i + 1, i + 2
+        if t == start:
+            return i + 1, i + 1
+        h = t
+    return -1, -1
+
+
+@inlined
+def keeps_link(mesh, h, ring_a, n_a, m_a, ring_b, n_b, m_b):  # type: ignore[no-untyped-def]
+    """Guard: the link condition, link(a) and link(b) meet in link(ab) only.
+
+    [Dey et al. 1999]: the common neighbours are the apexes of the edge's faces, and a tetrahedron,
+    whose links share an edge too, stays.
+    """
+    common = 0
+    for i in range(m_a):
+        for j in range(m_b):
+            if ring_a[i] == ring_b[j]:
+                common += 1
+    if mesh.twin[h] == NONE:
+        return common == 1
+    return common == 2 and not (n_a == 3 and m_a == 3 and n_b == 3 and m_b == 3)
+
+
+@inlined
+def _position(mesh, a, b, reach, faces, n_a, n_b):  # type: ignore[no-untyped-def]
+    """Where the two ends meet: at the more constrained one, else midpoint or quadric point."""
+    if mesh.kind[a] > mesh.kind[b]:
+        return mesh.X[a, 0], mesh.X[a, 1], mesh.X[a, 2]
+    if mesh.kind[b] > mesh.kind[a]:
+        return mesh.X[b, 0], mesh.X[b, 1], mesh.X[b, 2]
+    x = 0.5 * (mesh.X[a, 0] + mesh.X[b, 0])
+    y = 0.5 * (mesh.X[a, 1] + mesh.X[b, 1])
+    z = 0.5 * (mesh.X[a, 2] + mesh.X[b, 2])
+    if reach <= 0.0 or mesh.kind[a] != INNER:
+        return x, y, z
+    return _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b)
+
+
+@inlined
+def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b):  # type: ignore[no-untyped-def]
+    """Point closest to the planes of both rings, weighted by area [Garland and Heckbert 1997]."""
+    xx = xy = xz = yy = yz = zz = gx = gy = gz = weight = 0.0
+    X = mesh.X
+    for side in range(2):
+        for i in range(n_a if side == 0 else n_b):
+            h = faces[side, i]
+            u = mesh.origin[h]
+            v = mesh.origin[following(h)]
+            w = mesh.origin[previous(h)]
+            nx, ny, nz = face_vector(
+                X[u, 0], X[u, 1], X[u, 2], X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2]
+            )
+            norm = sqrt(nx * nx + ny * ny + nz * nz)
+            if norm == 0.0:
+                continue
+            weight += norm
+            height = (nx * (x - X[u, 0]) + ny * (y - X[u, 1]) + nz * (z - X[u, 2])) / norm
+            gx -= nx * height
+            gy -= ny * height
+            gz -= nz * height
+            nx_unit = nx / norm
+            ny_unit = ny / norm
+            xx += nx * nx_unit
+            xy += ny * nx_unit
+            xz += nz * nx_unit
+            yy += ny * ny_unit
+            yz += nz * ny_unit
+            zz += nz * nz / norm
+    if weight == 0.0:
+        return x, y, z
+    pull = _REGULARISER * weight
+    xx += pull
+    yy += pull
+    zz += pull
+    c0 = yy * zz - yz * yz
+    c1 = xz * yz - xy * zz
+    c2 = xy * yz - xz * yy
+    determinant = xx * c0 + xy * c1 + xz * c2
+    dx = (c0 * gx + c1 * gy + c2 * gz) / determinant
+    dy = (c1 * gx + (xx * zz - xz * xz) * gy + (xy * xz - xx * yz) * gz) / determinant
+    dz = (c2 * gx + (xy * xz - xx * yz) * gy + (xx * yy - xy * xy) * gz) / determinant
+    length = sqrt(dx * dx + dy * dy + dz * dz)
+    if not length < np.inf:
+        return x, y, z
+    shrink = reach / length if length > reach else 1.0
+    return x + shrink * dx, y + shrink * dy, z + shrink * dz
+
+
+@inlined
+def overshoots(X, x, y, z, other, ring, m, limit):  # type: ignore[no-untyped-def]
+    """Guard: an edge from the new position to the ring would be too long."""
+    longest = 0.0
+    for i in range(m):
+        w = ring[i]
+        if w != other:
+            dx = X[w, 0] - x
+            dy = X[w, 1] - y
+            dz = X[w, 2] - z
+            longest = max(longest, dx * dx + dy * dy + dz * dz)
+    return longest > limit
+
+
+@inlined
+def folds_over(mesh, x, y, z, other, faces, n, cosine):  # type: ignore[no-untyped-def]
+    """Guard: a face that stays would turn its normal too far, or lose its area."""
+    X = mesh.X
+    for i in range(n):
+        h = faces[i]
+        u = mesh.origin[h]
+        v = mesh.origin[following(h)]
+        w = mesh.origin[previous(h)]
+        if v == other or w == other:
+            continue
+        ox, oy, oz = face_vector(
+            X[u, 0], X[u, 1], X[u, 2], X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2]
+        )
+        nx, ny, nz = face_vector(x, y, z, X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2])
+        if ox == 0.0 and oy == 0.0 and oz == 0.0:
+            if nx == 0.0 and ny == 0.0 and nz == 0.0:
+                return True
+        elif turn_exceeds(ox, oy, oz, nx, ny, nz, cosine):
+            return True
+    return False
+
+
+@inlined
+def makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):  # type: ignore[no-untyped-def]
+    """Guard (optional): the worst triangle after would be worse than the worst before."""
+    X = mesh.X
+    before = 1.0
+    after = 1.0
+    for side in range(2):
+        other = b if side == 0 else a
+        for i in range(n_a if side == 0 else n_b):
+            h = faces[side, i]
+            u = mesh.origin[h]
+            v = mesh.origin[following(h)]
+            w = mesh.origin[previous(h)]
+            opposite = distance_squared(X, v, w)
+            before = min(before, _shape(X, X[u, 0], X[u, 1], X[u, 2], v, w, opposite))
+            if v != other and w != other:
+                after = min(after, _shape(X, x, y, z, v, w, opposite))
+    return after < before
+
+
+@inlined
+def _shape(X, x, y, z, v, w, opposite):  # type: ignore[no-untyped-def]
+    nx, ny, nz = face_vector(x, y, z, X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2])
+    lv = (X[v, 0] - x) ** 2 + (X[v, 1] - y) ** 2 + (X[v, 2] - z) ** 2
+    lw = (X[w, 0] - x) ** 2 + (X[w, 1] - y) ** 2 + (X[w, 2] - z) ** 2
+    return mean_ratio(lv, lw, opposite, sqrt(nx * nx + ny * ny + nz * nz))
+
+
+@inlined
+def _remove_edge(mesh, h, a, b, x, y, z, faces, n_a, n_b):  # type: ignore[no-untyped-def]
+    """Close the edge's one or two faces and give the other faces of the removed end to the survivor."""
+    twin = mesh.twin
+    t = np.int64(twin[h])
+    n = following(h)
+    tn = np.int64(twin[n])
+    tp = np.int64(twin[previous(h)])
+    survivor, removed, side, count = a, b, 1, n_b
+    if mesh.kind[b] > mesh.kind[a]:
+        survivor, removed, side, count = b, a, 0, n_a
+    # Where the survivor's one-ring will start: boundary vertices at their half-edge without twin.
+    start = np.int64(mesh.vertex_halfedge[a])
+    if t == NONE or twin[start] != NONE:
+        start = np.int64(mesh.vertex_halfedge[b])
+    inner = twin[start] != NONE
+    if inner or start == n:
+        start = tp
+    elif t != NONE and start == following(t):
+        start = np.int64(twin[previous(t)])
+    excess = mesh.valence_excess[a] + mesh.valence_excess[b] + (1 if t == NONE else 2)
+
+    _close_face(mesh, h, tn, tp)
+    if t != NONE:
+        _close_face(mesh, t, np.int64(twin[following(t)]), np.int64(twin[previous(t)]))
+    for i in range(count):
+        if mesh.origin[faces[side, i]] != DEAD:
+            mesh.origin[faces[side, i]] = survivor
+    mesh.vertex_halfedge[survivor] = start
+    mesh.valence_excess[survivor] = excess
+    mesh.vertex_halfedge[removed] = DEAD
+    mesh.X[survivor, 0] = x
+    mesh.X[survivor, 1] = y
+    mesh.X[survivor, 2] = z
+
+
+@inlined
+def _close_face(mesh, h, tn, tp):  # type: ignore[no-untyped-def]
+    """Remove the face of ``h`` and join the twins of its other two edges."""
+    p = previous(h)
+    apex = mesh.origin[p]
+    if tn != NONE:
+        mesh.twin[tn] = tp
+    if tp != NONE:
+        mesh.twin[tp] = tn
+    if mesh.vertex_halfedge[apex] == p:
+        mesh.vertex_halfedge[apex] = tn
+    mesh.valence_excess[apex] -= 1
+    f = h // 3
+    mesh.origin[3 * f] = DEAD
+    mesh.origin[3 * f + 1] = DEAD
+    mesh.origin[3 * f + 2] = DEAD

@@ -1,0 +1,277 @@
+"""Split long edges: all long edges of a face at once, by template.
+
+One round marks the edges that are too long, counts, and writes the refined mesh into new arrays, so
+that compaction and vertex order come for free: children take the place of their face, vertices follow
+the half-edge that owns them (``vertex_halfedge``), midpoints follow theirs. Rounds go on until no edge
+is too long, 3 or 4 in the first sweep, 1 later; each halves the longest edge. Splitting in place in
+half-edge order never ends: a long neighbour moves to a new slot again and again.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from .._jit import driver, kernel
+from .._types import BOUNDARY, DEAD, INNER, NONE, Blocks, Mesh
+from ..geometry import distance_squared
+
+__all__ = ["MAX_ROUNDS", "compact", "split_long_edges"]
+
+# Every round halves the longest edge: 64 rounds divide any float64 length below any other.
+MAX_ROUNDS = 64
+
+# Child triangles of a face by its mask of long edges (bit i: edge i from corner i to i + 1); with
+# two long edges bit 3 chooses the diagonal. Entries 0-2 are corners, 3-5 midpoints of edges 0-2.
+_CHILDREN: dict[int, list[tuple[int, int, int]]] = {
+    0: [(0, 1, 2)],
+    1: [(0, 3, 2), (3, 1, 2)],
+    2: [(1, 4, 0), (4, 2, 0)],
+    4: [(2, 5, 1), (5, 0, 1)],
+    7: [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)],
+    # edges 0 and 1 long: corner 1 is cut off, the quad 0-3-4-2 is halved by 3-2 or by 0-4.
+    3: [(3, 1, 4), (0, 3, 2), (3, 4, 2)],
+    3 + 8: [(3, 1, 4), (0, 3, 4), (0, 4, 2)],
+    # edges 1 and 2 long: corner 2 is cut off, the quad 1-4-5-0 is halved by 4-0 or by 1-5.
+    6: [(4, 2, 5), (1, 4, 0), (4, 5, 0)],
+    6 + 8: [(4, 2, 5), (1, 4, 5), (1, 5, 0)],
+    # edges 2 and 0 long: corner 0 is cut off, the quad 2-5-3-1 is halved by 5-1 or by 2-3.
+    5: [(5, 0, 3), (2, 5, 1), (5, 3, 1)],
+    5 + 8: [(5, 0, 3), (2, 5, 3), (2, 3, 1)],
+}
+
+
+def _build_templates() -> tuple[np.ndarray, ...]:
+    """Turn the list of children into tables.
+
+    Counts, corners, twins inside, place of each half edge, faces that each corner gains.
+    """
+    count = np.zeros(16, np.int64)
+    corner = np.full((16, 12), -1, np.int64)
+    inner = np.full((16, 12), -1, np.int64)
+    part = np.full((16, 6), -1, np.int64)
+    for mask, children in _CHILDREN.items():
+        count[mask] = len(children)
+        flat = [v for child in children for v in child]
+        ends = {}
+        for i, v in enumerate(flat):
+            corner[mask, i] = v
+            ends[v, flat[i - i % 3 + (i + 1) % 3]] = i
+        for (a, b), i in ends.items():
+            inner[mask, i] = ends.get((b, a), -1)
+        for edge in range(3):
+            a, b, middle = edge, (edge + 1) % 3, 3 + edge
+            if (a, b) in ends:
+                part[mask, 2 * edge] = ends[a, b]
+            else:
+                part[mask, 2 * edge] = ends[a, middle]
+                part[mask, 2 * edge + 1] = ends[middle, b]
+    gain = np.stack([(corner == v).sum(axis=1) - (v < 3) for v in range(6)], axis=1)
+    return count, corner, inner, part, gain
+
+
+_COUNT, _CORNER, _INNER, _PART, _GAIN = _build_templates()
+
+
+def split_long_edges(
+    mesh: Mesh, blocks: Blocks, longest: float, parallel: bool
+) -> tuple[Mesh, int]:
+    """Split every edge longer than ``longest``, once.
+
+    Returns
+    -------
+    mesh : Mesh
+        The refined mesh in new arrays, or the same one where no edge is too long.
+    n_split : int
+        Edges split; call again until it is 0.
+    """
+    mask = np.empty(mesh.origin.size // 3, np.uint8)
+    sizes = np.zeros((len(blocks.face) - 1, 4), np.int64)
+    _mark_long_edges(parallel, mesh, blocks, longest * longest, mask, sizes)
+    n_split = int(sizes[:, 2].sum())
+    return (_refine(mesh, blocks, mask, sizes, parallel) if n_split else mesh), n_split
+
+
+def compact(mesh: Mesh, blocks: Blocks, parallel: bool) -> Mesh:
+    """Drop removed faces and vertices, keeping the order: a split of no edge."""
+    mask = np.empty(mesh.origin.size // 3, np.uint8)
+    sizes = np.zeros((len(blocks.face) - 1, 4), np.int64)
+    _mark_long_edges(parallel, mesh, blocks, np.inf, mask, sizes)
+    return _refine(mesh, blocks, mask, sizes, parallel)
+
+
+def _refine(
+    mesh: Mesh, blocks: Blocks, mask: np.ndarray, sizes: np.ndarray, parallel: bool
+) -> Mesh:
+    starts = np.zeros_like(sizes)
+    np.cumsum(sizes[:-1], axis=0, out=starts[1:])
+    n_faces = int(sizes[:, 0].sum())
+    n_vertices = int(sizes[:, 1].sum() + sizes[:, 2].sum())
+    first_child = np.empty(mask.size, np.int32)
+    new_vertex = np.empty(mesh.vertex_halfedge.size, np.int32)
+    middle = np.empty(mesh.origin.size, np.int32)
+    refined = Mesh(
+        np.empty(3 * n_faces, np.int32),
+        np.empty(3 * n_faces, np.int32),
+        np.empty(n_vertices, np.int32),
+        np.empty(n_vertices, np.int32),
+        np.empty((n_vertices, 4)),
+        np.empty(n_vertices, np.uint8),
+        np.empty(n_vertices, np.int32),
+    )
+    _number(parallel, mesh, blocks, mask, starts, first_child, new_vertex, middle)
+    _write_faces(parallel, mesh, blocks, mask, first_child, new_vertex, middle, refined)
+    _write_vertices(parallel, mesh, blocks, mask, first_child, new_vertex, middle, refined)
+    if sizes[:, 2].any():
+        _update_valences(mesh, mask, new_vertex, middle, refined)
+    return refined
+
+
+@driver
+def _mark_long_edges(mesh, blocks, longest_squared, mask, sizes):  # type: ignore[no-untyped-def]
+    """Mask of long edges a face; per block: children, vertices owned, edges split."""
+    for k in prange(blocks.face.size - 1):
+        children = 0
+        owned = 0
+        split = 0
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            a = mesh.origin[3 * f]
+            if a == DEAD:
+                mask[f] = 255
+                continue
+            b = mesh.origin[3 * f + 1]
+            c = mesh.origin[3 * f + 2]
+            l0 = distance_squared(mesh.X, a, b)
+            l1 = distance_squared(mesh.X, b, c)
+            l2 = distance_squared(mesh.X, c, a)
+            m = 0
+            if l0 > longest_squared:
+                m |= 1
+            if l1 > longest_squared:
+                m |= 2
+            if l2 > longest_squared:
+                m |= 4
+            # The shorter diagonal of the quad, from the edges' lengths: the midpoint of the longer
+            # of the two split edges is farther from the other end of its edge, and so the diagonal
+            # to that midpoint is the shorter one.
+            if (m == 3 and l1 > l0) or (m == 6 and l2 > l1) or (m == 5 and l0 > l2):
+                m |= 8
+            mask[f] = m
+            children += _COUNT[m]
+            for i in range(3):
+                h = 3 * f + i
+                if mesh.vertex_halfedge[mesh.origin[h]] == h:
+                    owned += 1
+                if (m >> i) & 1 and mesh.twin[h] < h:
+                    split += 1
+        sizes[k, 0] = children
+        sizes[k, 1] = owned
+        sizes[k, 2] = split
+
+
+@driver
+def _number(mesh, blocks, mask, starts, first_child, new_vertex, middle):  # type: ignore[no-untyped-def]
+    """Number children, vertices and midpoints in the order of the half-edges that own them."""
+    for k in prange(blocks.face.size - 1):
+        child = starts[k, 0]
+        vertex = starts[k, 1] + starts[k, 2]
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            m = np.int64(mask[f])
+            if m == 255:
+                continue
+            first_child[f] = child
+            child += _COUNT[m]
+            for i in range(3):
+                h = 3 * f + i
+                v = mesh.origin[h]
+                if mesh.vertex_halfedge[v] == h:
+                    new_vertex[v] = vertex
+                    vertex += 1
+                # The later half-edge of a pair owns the midpoint; one without twin is the later.
+                if (m >> i) & 1 and mesh.twin[h] < h:
+                    middle[h] = vertex
+                    vertex += 1
+
+
+@driver
+def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, refined):  # type: ignore[no-untyped-def]
+    """Write children and their twins: inside a template from its table, across by parts of edges."""
+    for k in prange(blocks.face.size - 1):
+        ids = np.empty(6, np.int64)
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            m = np.int64(mask[f])
+            if m == 255:
+                continue
+            base = 3 * np.int64(first_child[f])
+            for i in range(3):
+                h = 3 * f + i
+                ids[i] = new_vertex[mesh.origin[h]]
+                if (m >> i) & 1:
+                    ids[3 + i] = middle[max(h, np.int64(mesh.twin[h]))]
+            for j in range(3 * _COUNT[m]):
+                refined.origin[base + j] = ids[_CORNER[m, j]]
+                refined.twin[base + j] = base + _INNER[m, j] if _INNER[m, j] >= 0 else NONE
+            for i in range(3):
+                t = np.int64(mesh.twin[3 * f + i])
+                if t == NONE:
+                    continue
+                g = t // 3
+                j = 2 * (t - 3 * g)
+                other = np.int64(mask[g])
+                other_base = 3 * np.int64(first_child[g])
+                if (m >> i) & 1:
+                    refined.twin[base + _PART[m, 2 * i]] = other_base + _PART[other, j + 1]
+                    refined.twin[base + _PART[m, 2 * i + 1]] = other_base + _PART[other, j]
+                else:
+                    refined.twin[base + _PART[m, 2 * i]] = other_base + _PART[other, j]
+
+
+@driver
+def _write_vertices(mesh, blocks, mask, first_child, new_vertex, middle, refined):  # type: ignore[no-untyped-def]
+    """Copy the vertices and put midpoints between them, each from the half-edge that owns it."""
+    for k in prange(blocks.face.size - 1):
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            m = np.int64(mask[f])
+            if m == 255:
+                continue
+            base = 3 * np.int64(first_child[f])
+            for i in range(3):
+                h = 3 * f + i
+                v = mesh.origin[h]
+                if mesh.vertex_halfedge[v] == h:
+                    new = new_vertex[v]
+                    refined.vertex_halfedge[new] = base + _PART[m, 2 * i]
+                    refined.valence_excess[new] = mesh.valence_excess[v]
+                    refined.kind[new] = mesh.kind[v]
+                    refined.birth[new] = mesh.birth[v]
+                    for j in range(4):
+                        refined.X[new, j] = mesh.X[v, j]
+                if (m >> i) & 1 and mesh.twin[h] < h:
+                    new = middle[h]
+                    w = mesh.origin[3 * f + (i + 1) % 3]
+                    inner = mesh.twin[h] != NONE
+                    refined.vertex_halfedge[new] = base + _PART[m, 2 * i + 1]
+                    # No face yet: `_update_valences` adds them. A boundary has an edge more.
+                    refined.valence_excess[new] = -6 if inner else -3
+                    refined.kind[new] = INNER if inner else BOUNDARY
+                    refined.birth[new] = mesh.birth[v]
+                    for j in range(4):
+                        refined.X[new, j] = 0.5 * (mesh.X[v, j] + mesh.X[w, j])
+
+
+@kernel
+def _update_valences(mesh, mask, new_vertex, middle, refined):  # type: ignore[no-untyped-def]
+    """Add what the children of split faces bring; serial, because faces share vertices.
+
+    2 ns a face, and a pass over bytes where nothing was split.
+    """
+    for f in range(mask.size):
+        m = np.int64(mask[f])
+        if m == 0 or m == 255:
+            continue
+        for i in range(3):
+            h = 3 * f + i
+            refined.valence_excess[new_vertex[mesh.origin[h]]] += _GAIN[m, i]
+            if (m >> i) & 1:
+                owner = max(h, np.int64(mesh.twin[h]))
+                refined.valence_excess[middle[owner]] += _GAIN[m, 3 + i]
