@@ -1,1 +1,26 @@
-"""Isotropic remeshing of triangle meshes."""
+"""Isotropic remeshing of triangle meshes, fast, deterministic, with provenance.
+
+>>> V2, F2 = remesh(V, F, L)  # doctest: +SKIP
+"""
+
+from .distance import SurfaceDistance, surface_distance
+from .errors import MeshFormatError, MeshInputError, OptionError, RemeshvecError
+from .quality import Quality, quality
+from .remesh import remesh
+from .report import RemeshResult, Report
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "MeshFormatError",
+    "MeshInputError",
+    "OptionError",
+    "Quality",
+    "RemeshResult",
+    "RemeshvecError",
+    "Report",
+    "SurfaceDistance",
+    "quality",
+    "remesh",
+    "surface_distance",
+]

@@ -3,7 +3,9 @@
 * ``inlined``: scalar helper, called from kernels only.
 * ``kernel``: serial kernel, called from Python or from drivers.
 * ``driver``: a loop over blocks written once with ``prange``; compiled as a serial and, when first
-  needed, as a parallel kernel. Both give the same bits, because blocks never conflict.
+  needed, as a parallel kernel. Both give the same bits, because blocks never conflict. A driver
+  that only writes to fields of a record needs these arrays as arguments of their own: Numba's
+  parallel build (0.68) takes such writes for dead code and drops the loop.
 
 No ``fastmath``: results decide topology and must not depend on how a loop was vectorised.
 ``error_model="numpy"`` lets a division by zero give inf or NaN; kernels never raise.
@@ -43,7 +45,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     return numba.njit(**_FLAGS)(_keyed(function, ""))
 
 
-class driver:  # noqa: N801  (a decorator, used like the two functions above)
+class driver:  # lower case: a decorator, used like the two functions above
     """Compile a ``prange`` loop over blocks twice: serial, and parallel when first needed."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -93,7 +95,7 @@ def _feed(digest: Any, code: CodeType, scope: dict[str, Any]) -> None:
         else:
             digest.update(repr(constant).encode())
     for name in code.co_names:
-        value = scope.get(name)
+        value: Any = scope.get(name)
         if hasattr(value, "py_func"):
             digest.update(value.py_func.__qualname__.encode())
         elif isinstance(value, int | float | bool | str | tuple):
@@ -112,7 +114,7 @@ _pool_process = os.getpid()
 
 def available_threads() -> int:
     """Count the threads that a call may use at most (Numba's limit, which follows the CPU mask)."""
-    return int(numba.config.NUMBA_NUM_THREADS)
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
 @contextmanager

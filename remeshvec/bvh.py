@@ -37,7 +37,7 @@ def build_tree(X: FloatArray, F: IndexArray, parallel: bool) -> Tree:
 
 
 @driver
-def _fill_leaves(X, F, corners, boxes):  # type: ignore[no-untyped-def]
+def _fill_leaves(X, F, corners, boxes):
     for leaf in prange(-(-F.shape[0] // _LEAF)):
         for i in range(3):
             boxes[leaf, i] = np.inf
@@ -59,7 +59,7 @@ def _fill_level(boxes: FloatArray, below: int, start: int, end: int) -> None:
 
 
 @inlined
-def _box_distance(boxes, i, x, y, z):  # type: ignore[no-untyped-def]
+def _box_distance(boxes, i, x, y, z):
     """Squared distance from a point to a box."""
     dx = max(boxes[i, 0] - x, 0.0, x - boxes[i, 3])
     dy = max(boxes[i, 1] - y, 0.0, y - boxes[i, 4])
@@ -68,7 +68,7 @@ def _box_distance(boxes, i, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def face_distance(corners, f, x, y, z):  # type: ignore[no-untyped-def]
+def face_distance(corners, f, x, y, z):
     """Barycentric weights of corners 1 and 2 of the closest point of a face; squared distance."""
     return closest_on_triangle(
         x, y, z,
@@ -79,7 +79,7 @@ def face_distance(corners, f, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def closest_face(tree, x, y, z, hint, node, depth):  # type: ignore[no-untyped-def]
+def closest_face(tree, x, y, z, hint, node, depth):
     """Face closest to a point, with weights of its corners 1 and 2 and the squared distance.
 
     Ties go to the hint, then to the smaller index, so that the answer does not depend on the path.

@@ -71,7 +71,7 @@ def stages(blocks: Blocks) -> tuple[int, ...]:
 
 
 @inlined
-def stage_blocks(blocks, stage):  # type: ignore[no-untyped-def]
+def stage_blocks(blocks, stage):
     """Count the blocks that a stage runs in parallel."""
     count = blocks.face.size - 1
     if stage == OWNED:
@@ -80,7 +80,7 @@ def stage_blocks(blocks, stage):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def vertex_range(blocks, stage, k):  # type: ignore[no-untyped-def]
+def vertex_range(blocks, stage, k):
     """Vertices that block ``k`` of a stage may touch."""
     last = blocks.vertex.size - 1
     if stage == OWNED:
@@ -93,7 +93,7 @@ def vertex_range(blocks, stage, k):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def list_range(blocks, stage, k):  # type: ignore[no-untyped-def]
+def list_range(blocks, stage, k):
     """Candidate lists (first, end) that block ``k`` of a stage reads."""
     if stage == OWNED:
         return k, k + 1

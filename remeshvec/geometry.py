@@ -23,7 +23,7 @@ __all__ = [
 
 
 @inlined
-def distance_squared(X, a, b):  # type: ignore[no-untyped-def]
+def distance_squared(X, a, b):
     """Squared length of the edge a-b; the same bits in both directions."""
     x = X[a, 0] - X[b, 0]
     y = X[a, 1] - X[b, 1]
@@ -32,7 +32,7 @@ def distance_squared(X, a, b):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):  # type: ignore[no-untyped-def]
+def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):
     """Twice the area times the unit normal of the triangle a, b, c."""
     ux = bx - ax
     uy = by - ay
@@ -44,7 +44,7 @@ def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):  # type: ignore[no-untyped-
 
 
 @inlined
-def turn_exceeds(ux, uy, uz, wx, wy, wz, cosine):  # type: ignore[no-untyped-def]
+def turn_exceeds(ux, uy, uz, wx, wy, wz, cosine):
     """Tell whether the angle between two vectors exceeds ``acos(cosine)``, ``cosine >= 0``.
 
     A zero ``w`` always exceeds; no square root is taken.
@@ -57,7 +57,7 @@ def turn_exceeds(ux, uy, uz, wx, wy, wz, cosine):  # type: ignore[no-untyped-def
 
 
 @inlined
-def mean_ratio(l0, l1, l2, double_area):  # type: ignore[no-untyped-def]
+def mean_ratio(l0, l1, l2, double_area):
     """Shape of a triangle from squared lengths: 1 equilateral, 0 degenerate.
 
     ``4 sqrt(3) area / (sum of squared edge lengths)`` [Bank and Smith 1997].
@@ -69,7 +69,7 @@ def mean_ratio(l0, l1, l2, double_area):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def mixed_voronoi_areas(l0, l1, l2, double_area):  # type: ignore[no-untyped-def]
+def mixed_voronoi_areas(l0, l1, l2, double_area):
     """Split a triangle's area among its corners [Meyer et al. 2003, section 3.3].
 
     ``l0, l1, l2`` are the squared lengths of the edges opposite corners 0, 1, 2.
@@ -92,7 +92,7 @@ def mixed_voronoi_areas(l0, l1, l2, double_area):  # type: ignore[no-untyped-def
 
 
 @inlined
-def angle_from_cosine(cosine):  # type: ignore[no-untyped-def]
+def angle_from_cosine(cosine):
     """Angle in [0, pi], to 7e-5 rad [Abramowitz and Stegun 1964, 4.4.45].
 
     Only for weights: a true ``acos`` would take half of the time of a relaxation.
@@ -105,7 +105,7 @@ def angle_from_cosine(cosine):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def closest_on_segment(px, py, pz, ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
+def closest_on_segment(px, py, pz, ax, ay, az, bx, by, bz):
     """Parameter in [0, 1] of the point of a-b closest to p, and the squared distance."""
     ux = bx - ax
     uy = by - ay
@@ -122,7 +122,7 @@ def closest_on_segment(px, py, pz, ax, ay, az, bx, by, bz):  # type: ignore[no-u
 
 
 @inlined
-def closest_on_triangle(px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz):  # type: ignore[no-untyped-def]
+def closest_on_triangle(px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz):
     """Barycentric weights of b and c of the closest point, and the squared distance.
 
     By regions as in Ericson [2005, section 5.1.5]; a triangle without area falls back on its edges.

@@ -19,13 +19,13 @@ __all__ = ["BuildReport", "build_mesh", "following", "previous"]
 
 
 @inlined
-def following(h):  # type: ignore[no-untyped-def]
+def following(h):
     """Return the next half-edge of the same face."""
     return h + 1 if np.uint64(h) % np.uint64(3) != np.uint64(2) else h - 2
 
 
 @inlined
-def previous(h):  # type: ignore[no-untyped-def]
+def previous(h):
     """Return the previous half-edge of the same face."""
     return h - 1 if np.uint64(h) % np.uint64(3) != np.uint64(0) else h + 2
 
@@ -76,7 +76,7 @@ def build_mesh(X: FloatArray, F: IndexArray) -> tuple[Mesh, BuildReport]:
 
 
 @kernel
-def _match_twins(origin, twin, n, is_cut):  # type: ignore[no-untyped-def]
+def _match_twins(origin, twin, n, is_cut):
     """Pair opposite half-edges: bucket by the smaller end, match within the bucket.
 
     ``first`` and ``seen`` are indexed by the larger end and stamped with the smaller, so that a
@@ -129,7 +129,7 @@ def _match_twins(origin, twin, n, is_cut):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _split_fans(origin, twin, n, source):  # type: ignore[no-untyped-def]
+def _split_fans(origin, twin, n, source):
     """Give every fan of faces around a vertex a vertex of its own; returns their number."""
     used = np.zeros(n, np.uint8)
     visited = np.zeros(origin.size, np.uint8)
@@ -162,7 +162,7 @@ def _split_fans(origin, twin, n, source):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _fill_vertices(mesh):  # type: ignore[no-untyped-def]
+def _fill_vertices(mesh):
     """Set ``vertex_halfedge``, kinds and valences from origins and twins."""
     for v in range(mesh.vertex_halfedge.size):
         mesh.valence_excess[v] = -6

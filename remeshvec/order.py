@@ -56,7 +56,7 @@ def order_mesh(V: FloatArray, F: IndexArray, parallel: bool) -> Ordered:
 
 
 @inlined
-def _spread(x):  # type: ignore[no-untyped-def]
+def _spread(x):
     """Put two zero bits between the bits of a 21-bit integer."""
     x = x & np.uint64(0x1FFFFF)
     x = (x | (x << np.uint64(32))) & np.uint64(0x1F00000000FFFF)
@@ -67,7 +67,7 @@ def _spread(x):  # type: ignore[no-untyped-def]
 
 
 @driver
-def _fill_keys(V, F, low, scale, index_bits, keys):  # type: ignore[no-untyped-def]
+def _fill_keys(V, F, low, scale, index_bits, keys):
     """Curve position in the high bits, face index in the low ones: keys are unique."""
     third = scale / 3.0
     shift = np.uint64(index_bits)
@@ -81,7 +81,7 @@ def _fill_keys(V, F, low, scale, index_bits, keys):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _renumber(F, keys, index_bits, n, face_source, ordered_faces, vertex_source):  # type: ignore[no-untyped-def]
+def _renumber(F, keys, index_bits, n, face_source, ordered_faces, vertex_source):
     new = np.full(n, -1, np.int32)
     mask = (np.uint64(1) << np.uint64(index_bits)) - np.uint64(1)
     count = 0
@@ -96,5 +96,3 @@ def _renumber(F, keys, index_bits, n, face_source, ordered_faces, vertex_source)
                 count += 1
             ordered_faces[i, c] = new[v]
     return count
-
-

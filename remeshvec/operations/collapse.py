@@ -66,7 +66,7 @@ def collapse_short_edges(
 
 
 @driver
-def _find_short_edges(mesh, blocks, shortest_squared, candidates, count):  # type: ignore[no-untyped-def]
+def _find_short_edges(mesh, blocks, shortest_squared, candidates, count):
     for k in prange(blocks.face.size - 1):
         end = 3 * blocks.face[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
@@ -90,7 +90,7 @@ def _find_short_edges(mesh, blocks, shortest_squared, candidates, count):  # typ
 
 
 @driver
-def _collapse(mesh, blocks, stage, limits, candidates, count, tally):  # type: ignore[no-untyped-def]
+def _collapse(mesh, blocks, stage, limits, candidates, count, tally):
     for k in prange(stage_blocks(blocks, stage)):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
@@ -111,7 +111,7 @@ def _collapse(mesh, blocks, stage, limits, candidates, count, tally):  # type: i
 
 
 @inlined
-def _collapse_edge(mesh, h, low, high, limits, faces, ring):  # type: ignore[no-untyped-def]
+def _collapse_edge(mesh, h, low, high, limits, faces, ring):
     """Collapse one edge if every guard agrees; returns the outcome."""
     a = np.int64(mesh.origin[h])
     b = np.int64(mesh.origin[following(h)])
@@ -147,7 +147,7 @@ def _collapse_edge(mesh, h, low, high, limits, faces, ring):  # type: ignore[no-
 
 
 @inlined
-def keeps_boundary(mesh, h, a, b):  # type: ignore[no-untyped-def]
+def keeps_boundary(mesh, h, a, b):
     """Guard: fixed vertices stay, and no inner edge joins two parts of the boundary.
 
     A boundary edge may go unless its face hangs on it alone.
@@ -162,7 +162,7 @@ def keeps_boundary(mesh, h, a, b):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def walk_ring(mesh, v, low, high, faces, ring):  # type: ignore[no-untyped-def]
+def walk_ring(mesh, v, low, high, faces, ring):
     """List outgoing half-edges and ring vertices of ``v``.
 
     Returns both counts; (0, 0) where a ring vertex lies outside the range, (-1, -1) where there are
@@ -191,7 +191,7 @@ def walk_ring(mesh, v, low, high, faces, ring):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def keeps_link(mesh, h, ring_a, n_a, m_a, ring_b, n_b, m_b):  # type: ignore[no-untyped-def]
+def keeps_link(mesh, h, ring_a, n_a, m_a, ring_b, n_b, m_b):
     """Guard: the link condition, link(a) and link(b) meet in link(ab) only.
 
     [Dey et al. 1999]: the common neighbours are the apexes of the edge's faces, and a tetrahedron,
@@ -208,7 +208,7 @@ def keeps_link(mesh, h, ring_a, n_a, m_a, ring_b, n_b, m_b):  # type: ignore[no-
 
 
 @inlined
-def _position(mesh, a, b, reach, faces, n_a, n_b):  # type: ignore[no-untyped-def]
+def _position(mesh, a, b, reach, faces, n_a, n_b):
     """Where the two ends meet: at the more constrained one, else midpoint or quadric point."""
     if mesh.kind[a] > mesh.kind[b]:
         return mesh.X[a, 0], mesh.X[a, 1], mesh.X[a, 2]
@@ -223,7 +223,7 @@ def _position(mesh, a, b, reach, faces, n_a, n_b):  # type: ignore[no-untyped-de
 
 
 @inlined
-def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b):  # type: ignore[no-untyped-def]
+def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b):
     """Point closest to the planes of both rings, weighted by area [Garland and Heckbert 1997]."""
     xx = xy = xz = yy = yz = zz = gx = gy = gz = weight = 0.0
     X = mesh.X
@@ -273,7 +273,7 @@ def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b):  # type: ignore[no-un
 
 
 @inlined
-def overshoots(X, x, y, z, other, ring, m, limit):  # type: ignore[no-untyped-def]
+def overshoots(X, x, y, z, other, ring, m, limit):
     """Guard: an edge from the new position to the ring would be too long."""
     longest = 0.0
     for i in range(m):
@@ -287,7 +287,7 @@ def overshoots(X, x, y, z, other, ring, m, limit):  # type: ignore[no-untyped-de
 
 
 @inlined
-def folds_over(mesh, x, y, z, other, faces, n, cosine):  # type: ignore[no-untyped-def]
+def folds_over(mesh, x, y, z, other, faces, n, cosine):
     """Guard: a face that stays would turn its normal too far, or lose its area."""
     X = mesh.X
     for i in range(n):
@@ -310,7 +310,7 @@ def folds_over(mesh, x, y, z, other, faces, n, cosine):  # type: ignore[no-untyp
 
 
 @inlined
-def makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):  # type: ignore[no-untyped-def]
+def makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
     """Guard (optional): the worst triangle after would be worse than the worst before."""
     X = mesh.X
     before = 1.0
@@ -330,7 +330,7 @@ def makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):  # type: ignore[no-untyp
 
 
 @inlined
-def _shape(X, x, y, z, v, w, opposite):  # type: ignore[no-untyped-def]
+def _shape(X, x, y, z, v, w, opposite):
     nx, ny, nz = face_vector(x, y, z, X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2])
     lv = (X[v, 0] - x) ** 2 + (X[v, 1] - y) ** 2 + (X[v, 2] - z) ** 2
     lw = (X[w, 0] - x) ** 2 + (X[w, 1] - y) ** 2 + (X[w, 2] - z) ** 2
@@ -338,7 +338,7 @@ def _shape(X, x, y, z, v, w, opposite):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _remove_edge(mesh, h, a, b, x, y, z, faces, n_a, n_b):  # type: ignore[no-untyped-def]
+def _remove_edge(mesh, h, a, b, x, y, z, faces, n_a, n_b):
     """Close the edge's one or two faces and give the other faces of the removed end to the survivor."""
     twin = mesh.twin
     t = np.int64(twin[h])
@@ -374,7 +374,7 @@ def _remove_edge(mesh, h, a, b, x, y, z, faces, n_a, n_b):  # type: ignore[no-un
 
 
 @inlined
-def _close_face(mesh, h, tn, tp):  # type: ignore[no-untyped-def]
+def _close_face(mesh, h, tn, tp):
     """Remove the face of ``h`` and join the twins of its other two edges."""
     p = previous(h)
     apex = mesh.origin[p]

@@ -16,8 +16,9 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined, kernel
-from .._types import DEAD, INNER, Blocks, Mesh
+from .._types import BOUNDARY, DEAD, INNER, MAX_VALENCE, NONE, Blocks, Mesh
 from ..geometry import angle_from_cosine, face_vector, mixed_voronoi_areas
+from ..halfedge import following, previous
 
 __all__ = ["RelaxOptions", "relax_vertices"]
 
@@ -31,28 +32,31 @@ class RelaxOptions(NamedTuple):
 
     angle_normals: bool  # vertex normals weighted by angle instead of by area
     stiffness: float  # 20: vertices on curved ridges stay; 0: off
+    slide: bool  # boundary vertices move along the boundary
 
 
 def relax_vertices(mesh: Mesh, blocks: Blocks, options: RelaxOptions, parallel: bool) -> None:
-    """Move every inner vertex once, in its tangent plane."""
+    """Move every inner vertex once in its tangent plane, boundary vertices along the boundary."""
     sums = np.empty((mesh.vertex_halfedge.size, N_SUMS))
     across = np.empty(mesh.origin.size // 3, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _sum_areas(parallel, mesh, blocks, across, count)
+    _sum_areas(parallel, mesh, blocks, mesh.X, across, count)
     _sum_areas_across(mesh, blocks, across, count)
     _sum_rings(parallel, mesh, blocks, options, across, count, sums)
     _sum_rings_across(mesh, blocks, options, across, count, sums)
-    _move(parallel, mesh, blocks, options, sums)
+    if options.slide:
+        _aim_boundary(parallel, mesh, blocks, sums)
+    _move(parallel, mesh, blocks, options, sums, mesh.X)
 
 
 @driver
-def _sum_areas(mesh, blocks, across, count):  # type: ignore[no-untyped-def]
+def _sum_areas(mesh, blocks, X, across, count):
     """Mixed Voronoi areas from the faces inside a block; lists the faces across borders."""
     for k in prange(blocks.face.size - 1):
         low = blocks.vertex[k]
         high = blocks.vertex[k + 1]
         for v in range(low, high):
-            mesh.X[v, 3] = 0.0
+            X[v, 3] = 0.0
         end = blocks.face[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             a = mesh.origin[3 * f]
@@ -64,12 +68,12 @@ def _sum_areas(mesh, blocks, across, count):  # type: ignore[no-untyped-def]
                 across[end] = f
                 end += 1
                 continue
-            _add_areas(mesh.X, a, b, c)
+            _add_areas(X, a, b, c)
         count[k] = end - blocks.face[k]
 
 
 @kernel
-def _sum_areas_across(mesh, blocks, across, count):  # type: ignore[no-untyped-def]
+def _sum_areas_across(mesh, blocks, across, count):
     for k in range(blocks.face.size - 1):
         for i in range(blocks.face[k], blocks.face[k] + count[k]):
             f = across[i]
@@ -77,7 +81,7 @@ def _sum_areas_across(mesh, blocks, across, count):  # type: ignore[no-untyped-d
 
 
 @inlined
-def _add_areas(X, a, b, c):  # type: ignore[no-untyped-def]
+def _add_areas(X, a, b, c):
     ux, uy, uz = X[c, 0] - X[b, 0], X[c, 1] - X[b, 1], X[c, 2] - X[b, 2]
     vx, vy, vz = X[a, 0] - X[c, 0], X[a, 1] - X[c, 1], X[a, 2] - X[c, 2]
     wx, wy, wz = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
@@ -94,7 +98,7 @@ def _add_areas(X, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @driver
-def _sum_rings(mesh, blocks, options, across, count, sums):  # type: ignore[no-untyped-def]
+def _sum_rings(mesh, blocks, options, across, count, sums):
     for k in prange(blocks.face.size - 1):
         low = blocks.vertex[k]
         high = blocks.vertex[k + 1]
@@ -108,7 +112,7 @@ def _sum_rings(mesh, blocks, options, across, count, sums):  # type: ignore[no-u
 
 
 @kernel
-def _sum_rings_across(mesh, blocks, options, across, count, sums):  # type: ignore[no-untyped-def]
+def _sum_rings_across(mesh, blocks, options, across, count, sums):
     for k in range(blocks.face.size - 1):
         for i in range(blocks.face[k], blocks.face[k] + count[k]):
             f = across[i]
@@ -119,7 +123,7 @@ def _sum_rings_across(mesh, blocks, options, across, count, sums):  # type: igno
 
 
 @inlined
-def _add_face(X, a, b, c, options, sums):  # type: ignore[no-untyped-def]
+def _add_face(X, a, b, c, options, sums):
     """Add a face to the sums of its corners; its half-edges bring each the neighbour they end at."""
     nx, ny, nz = face_vector(
         X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
@@ -147,7 +151,7 @@ def _add_face(X, a, b, c, options, sums):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _corner_angles(X, a, b, c):  # type: ignore[no-untyped-def]
+def _corner_angles(X, a, b, c):
     """Angles of a triangle, the third as what is missing to pi."""
     ux, uy, uz = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
     vx, vy, vz = X[c, 0] - X[a, 0], X[c, 1] - X[a, 1], X[c, 2] - X[a, 2]
@@ -161,7 +165,7 @@ def _corner_angles(X, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _add_neighbour(X, v, w, sums):  # type: ignore[no-untyped-def]
+def _add_neighbour(X, v, w, sums):
     area = X[w, 3]
     sums[v, 0] += area
     sums[v, 1] += area * X[w, 0]
@@ -170,14 +174,14 @@ def _add_neighbour(X, v, w, sums):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _add_normal(sums, v, weight, nx, ny, nz):  # type: ignore[no-untyped-def]
+def _add_normal(sums, v, weight, nx, ny, nz):
     sums[v, 4] += weight * nx
     sums[v, 5] += weight * ny
     sums[v, 6] += weight * nz
 
 
 @inlined
-def _add_tensor(sums, v, ux, uy, uz, nx, ny, nz, norm):  # type: ignore[no-untyped-def]
+def _add_tensor(sums, v, ux, uy, uz, nx, ny, nz, norm):
     sums[v, 7] += ux * nx
     sums[v, 8] += ux * ny
     sums[v, 9] += ux * nz
@@ -188,15 +192,47 @@ def _add_tensor(sums, v, ux, uy, uz, nx, ny, nz, norm):  # type: ignore[no-untyp
 
 
 @driver
-def _move(mesh, blocks, options, sums):  # type: ignore[no-untyped-def]
+def _aim_boundary(mesh, blocks, sums):
+    """Put the steps of boundary vertices, towards the middle of their two neighbours, in the sums."""
+    X = mesh.X
     for k in prange(blocks.vertex.size - 1):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
-            if mesh.vertex_halfedge[v] != DEAD and mesh.kind[v] == INNER:
-                _move_vertex(mesh.X, v, sums, options.stiffness)
+            if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != BOUNDARY:
+                continue
+            h = np.int64(mesh.vertex_halfedge[v])
+            after = mesh.origin[following(h)]
+            for _ in range(MAX_VALENCE):
+                p = previous(h)
+                h = np.int64(mesh.twin[p])
+                if h == NONE:
+                    break
+            before = mesh.origin[p]
+            along = 0.0
+            length = 0.0
+            for i in range(3):
+                direction = X[after, i] - X[before, i]
+                length += direction * direction
+                along += direction * (0.5 * (X[after, i] + X[before, i]) - X[v, i])
+            share = along / length if length > 0.0 else 0.0
+            for i in range(3):
+                sums[v, 1 + i] = share * (X[after, i] - X[before, i])
+
+
+@driver
+def _move(mesh, blocks, options, sums, X):
+    for k in prange(blocks.vertex.size - 1):
+        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
+            if mesh.vertex_halfedge[v] == DEAD:
+                continue
+            if mesh.kind[v] == INNER:
+                _move_vertex(X, v, sums, options.stiffness)
+            elif options.slide and mesh.kind[v] == BOUNDARY:
+                for i in range(3):
+                    X[v, i] += sums[v, 1 + i]
 
 
 @inlined
-def _move_vertex(X, v, sums, stiffness):  # type: ignore[no-untyped-def]
+def _move_vertex(X, v, sums, stiffness):
     nx, ny, nz = sums[v, 4], sums[v, 5], sums[v, 6]
     norm = sqrt(nx * nx + ny * ny + nz * nz)
     if not (sums[v, 0] > 0.0 and norm > 0.0):
@@ -219,7 +255,7 @@ def _move_vertex(X, v, sums, stiffness):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness):  # type: ignore[no-untyped-def]
+def _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness):
     """Damp the step where normals vary: ``(I + s Q^2)^-1 d``, Q the normal tensor in the tangent plane.
 
     Across a curved ridge Q is large and the vertex stays on it; along the ridge it still slides.
@@ -239,8 +275,16 @@ def _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness):  # type: ignore[no-u
     q = nx * ny * p
     sx, sy, sz = 1.0 + sign * nx * nx * p, sign * q, -sign * nx
     tx, ty, tz = q, sign + ny * ny * p, -ny
-    qs_x, qs_y, qs_z = xx * sx + xy * sy + xz * sz, xy * sx + yy * sy + yz * sz, xz * sx + yz * sy + zz * sz
-    qt_x, qt_y, qt_z = xx * tx + xy * ty + xz * tz, xy * tx + yy * ty + yz * tz, xz * tx + yz * ty + zz * tz
+    qs_x, qs_y, qs_z = (
+        xx * sx + xy * sy + xz * sz,
+        xy * sx + yy * sy + yz * sz,
+        xz * sx + yz * sy + zz * sz,
+    )
+    qt_x, qt_y, qt_z = (
+        xx * tx + xy * ty + xz * tz,
+        xy * tx + yy * ty + yz * tz,
+        xz * tx + yz * ty + zz * tz,
+    )
     ss = qs_x * sx + qs_y * sy + qs_z * sz
     st = qs_x * tx + qs_y * ty + qs_z * tz
     tt = qt_x * tx + qt_y * ty + qt_z * tz

@@ -120,15 +120,16 @@ def _refine(
         np.empty(n_vertices, np.int32),
     )
     _number(parallel, mesh, blocks, mask, starts, first_child, new_vertex, middle)
-    _write_faces(parallel, mesh, blocks, mask, first_child, new_vertex, middle, refined)
-    _write_vertices(parallel, mesh, blocks, mask, first_child, new_vertex, middle, refined)
+    numbers = (mask, first_child, new_vertex, middle)
+    _write_faces(parallel, mesh, blocks, *numbers, refined.origin, refined.twin)
+    _write_vertices(parallel, mesh, blocks, *numbers, *refined[2:])
     if sizes[:, 2].any():
         _update_valences(mesh, mask, new_vertex, middle, refined)
     return refined
 
 
 @driver
-def _mark_long_edges(mesh, blocks, longest_squared, mask, sizes):  # type: ignore[no-untyped-def]
+def _mark_long_edges(mesh, blocks, longest_squared, mask, sizes):
     """Mask of long edges a face; per block: children, vertices owned, edges split."""
     for k in prange(blocks.face.size - 1):
         children = 0
@@ -170,8 +171,8 @@ def _mark_long_edges(mesh, blocks, longest_squared, mask, sizes):  # type: ignor
 
 
 @driver
-def _number(mesh, blocks, mask, starts, first_child, new_vertex, middle):  # type: ignore[no-untyped-def]
-    """Number children, vertices and midpoints in the order of the half-edges that own them."""
+def _number(mesh, blocks, mask, starts, first_child, new_vertex, middle):
+    """Give children, vertices and midpoints the order of the half-edges that own them."""
     for k in prange(blocks.face.size - 1):
         child = starts[k, 0]
         vertex = starts[k, 1] + starts[k, 2]
@@ -194,7 +195,7 @@ def _number(mesh, blocks, mask, starts, first_child, new_vertex, middle):  # typ
 
 
 @driver
-def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, refined):  # type: ignore[no-untyped-def]
+def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, origin, twin):
     """Write children and their twins: inside a template from its table, across by parts of edges."""
     for k in prange(blocks.face.size - 1):
         ids = np.empty(6, np.int64)
@@ -209,8 +210,8 @@ def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, refined): 
                 if (m >> i) & 1:
                     ids[3 + i] = middle[max(h, np.int64(mesh.twin[h]))]
             for j in range(3 * _COUNT[m]):
-                refined.origin[base + j] = ids[_CORNER[m, j]]
-                refined.twin[base + j] = base + _INNER[m, j] if _INNER[m, j] >= 0 else NONE
+                origin[base + j] = ids[_CORNER[m, j]]
+                twin[base + j] = base + _INNER[m, j] if _INNER[m, j] >= 0 else NONE
             for i in range(3):
                 t = np.int64(mesh.twin[3 * f + i])
                 if t == NONE:
@@ -220,14 +221,16 @@ def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, refined): 
                 other = np.int64(mask[g])
                 other_base = 3 * np.int64(first_child[g])
                 if (m >> i) & 1:
-                    refined.twin[base + _PART[m, 2 * i]] = other_base + _PART[other, j + 1]
-                    refined.twin[base + _PART[m, 2 * i + 1]] = other_base + _PART[other, j]
+                    twin[base + _PART[m, 2 * i]] = other_base + _PART[other, j + 1]
+                    twin[base + _PART[m, 2 * i + 1]] = other_base + _PART[other, j]
                 else:
-                    refined.twin[base + _PART[m, 2 * i]] = other_base + _PART[other, j]
+                    twin[base + _PART[m, 2 * i]] = other_base + _PART[other, j]
 
 
 @driver
-def _write_vertices(mesh, blocks, mask, first_child, new_vertex, middle, refined):  # type: ignore[no-untyped-def]
+def _write_vertices(
+    mesh, blocks, mask, first_child, new_vertex, middle, halfedge, excess, X, kind, birth
+):
     """Copy the vertices and put midpoints between them, each from the half-edge that owns it."""
     for k in prange(blocks.face.size - 1):
         for f in range(blocks.face[k], blocks.face[k + 1]):
@@ -240,27 +243,27 @@ def _write_vertices(mesh, blocks, mask, first_child, new_vertex, middle, refined
                 v = mesh.origin[h]
                 if mesh.vertex_halfedge[v] == h:
                     new = new_vertex[v]
-                    refined.vertex_halfedge[new] = base + _PART[m, 2 * i]
-                    refined.valence_excess[new] = mesh.valence_excess[v]
-                    refined.kind[new] = mesh.kind[v]
-                    refined.birth[new] = mesh.birth[v]
+                    halfedge[new] = base + _PART[m, 2 * i]
+                    excess[new] = mesh.valence_excess[v]
+                    kind[new] = mesh.kind[v]
+                    birth[new] = mesh.birth[v]
                     for j in range(4):
-                        refined.X[new, j] = mesh.X[v, j]
+                        X[new, j] = mesh.X[v, j]
                 if (m >> i) & 1 and mesh.twin[h] < h:
                     new = middle[h]
                     w = mesh.origin[3 * f + (i + 1) % 3]
                     inner = mesh.twin[h] != NONE
-                    refined.vertex_halfedge[new] = base + _PART[m, 2 * i + 1]
+                    halfedge[new] = base + _PART[m, 2 * i + 1]
                     # No face yet: `_update_valences` adds them. A boundary has an edge more.
-                    refined.valence_excess[new] = -6 if inner else -3
-                    refined.kind[new] = INNER if inner else BOUNDARY
-                    refined.birth[new] = mesh.birth[v]
+                    excess[new] = -6 if inner else -3
+                    kind[new] = INNER if inner else BOUNDARY
+                    birth[new] = mesh.birth[v]
                     for j in range(4):
-                        refined.X[new, j] = 0.5 * (mesh.X[v, j] + mesh.X[w, j])
+                        X[new, j] = 0.5 * (mesh.X[v, j] + mesh.X[w, j])
 
 
 @kernel
-def _update_valences(mesh, mask, new_vertex, middle, refined):  # type: ignore[no-untyped-def]
+def _update_valences(mesh, mask, new_vertex, middle, refined):
     """Add what the children of split faces bring; serial, because faces share vertices.
 
     2 ns a face, and a pass over bytes where nothing was split.

@@ -1,0 +1,107 @@
+"""Make the meshes in this folder, and check them.
+
+``python data/make_meshes.py`` writes the meshes and the table in README.md; with ``--check`` it
+writes nothing, makes every mesh again and says which file differs.  Needs NumPy and libigl.
+Everything is seeded: on one platform the files come out byte for byte.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import igl
+import numpy as np
+import shapes
+from shapes import Floats, Ints, Mesh
+
+HERE = Path(__file__).resolve().parent
+TABLE_HEAD = (
+    "| file | vertices | faces | Euler number | boundary loops | components | SHA-256 |\n"
+    "|---|---|---|---|---|---|---|\n"
+)
+
+MESHES: dict[str, tuple[Callable[[], Mesh], int]] = {  # name -> maker, decimals
+    "creature.obj": (shapes.creature, 5),
+    "bracket.obj": (shapes.bracket, 6),
+    "wavy_sheet.obj": (shapes.wavy_sheet, 5),
+    "pretzel.off": (shapes.pretzel, 5),
+    "linked_rings.off": (shapes.linked_rings, 5),
+    "thin_sheet.obj": (shapes.thin_sheet, 5),
+}
+
+
+def as_text(name: str, V: Floats, F: Ints, decimals: int) -> str:
+    """Write OBJ or OFF with as many digits as the mesh needs."""
+    V = np.round(V, decimals) + 0.0  # + 0.0 turns -0 into 0
+    rows = [" ".join(f"{x:.{decimals}f}".rstrip("0").rstrip(".") for x in p) for p in V]
+    if name.endswith(".obj"):
+        faces = ["f {} {} {}".format(*f) for f in (F + 1).tolist()]
+        return "\n".join([*("v " + row for row in rows), *faces, ""])
+    faces = ["3 {} {} {}".format(*f) for f in F.tolist()]
+    return "\n".join(["OFF", f"{len(V)} {len(F)} 0", *rows, *faces, ""])
+
+
+def validated(name: str, V: Floats, F: Ints, decimals: int) -> None:
+    """Stop on a mesh that is not what README.md promises."""
+    V = np.round(V, decimals)
+    checks = {
+        "edge-manifold": igl.is_edge_manifold(F),
+        "vertex-manifold": bool(igl.is_vertex_manifold(F).all()),
+        "without flat faces": bool((igl.doublearea(V, F) > 0).all()),
+        "without unreferenced vertices": len(np.unique(F)) == len(V),
+        "oriented": len(np.unique(directed_edges(F), axis=0)) == 3 * len(F),
+    }
+    wrong = [what for what, ok in checks.items() if not ok]
+    if wrong:
+        raise SystemExit(f"{name} is not {' or '.join(wrong)}")
+
+
+def directed_edges(F: Ints) -> Ints:
+    """Return the edges of the faces, one row a corner."""
+    return np.vstack([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+
+
+def table_row(name: str, V: Floats, F: Ints, text: str) -> str:
+    """Count, and hash."""
+    edges = len(np.unique(np.sort(directed_edges(F), axis=1), axis=0))
+    loops = len(igl.boundary_loop_all(F)) if len(igl.boundary_facets(F)[0]) else 0
+    parts = len(np.unique(igl.facet_components(F)[1]))
+    counts = f"{len(V):,} | {len(F):,} | {len(V) - edges + len(F)} | {loops} | {parts}"
+    return f"| {name} | {counts} | `{hashlib.sha256(text.encode()).hexdigest()}` |\n"
+
+
+def main() -> int:
+    """Write or check the meshes and the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true", help="write nothing, report differences")
+    check = parser.parse_args().check
+    different, table = [], TABLE_HEAD
+    for name, (make, decimals) in MESHES.items():
+        V, F = make()
+        validated(name, V, F, decimals)
+        text = as_text(name, V, F, decimals)
+        table += table_row(name, V, F, text)
+        path = HERE / name
+        if check and (not path.exists() or path.read_bytes() != text.encode()):
+            different.append(name)
+        if not check:
+            path.write_bytes(text.encode())
+            print(f"{name:<18}{len(V):>7} vertices{len(F):>7} faces{len(text) / 1e3:>7.0f} kB")
+    readme = HERE / "README.md"
+    text = readme.read_text(encoding="utf-8")
+    start, stop = text.rindex("| file |"), text.rindex("|\n") + 2
+    if check and text[start:stop] != table:
+        different.append("README.md")
+    if not check:
+        readme.write_text(text[:start] + table + text[stop:], encoding="utf-8")
+    for name in different:
+        print(f"{name} differs from what this script makes", file=sys.stderr)
+    return 1 if different else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

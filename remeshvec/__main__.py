@@ -1,0 +1,5 @@
+"""``python -m remeshvec`` is the shell command."""
+
+from remeshvec.cli import main
+
+raise SystemExit(main())

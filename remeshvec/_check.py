@@ -1,0 +1,118 @@
+"""Casting of the caller's arrays, and the wording of input errors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import MeshInputError
+
+__all__ = ["as_faces", "as_mesh", "as_vertices", "positive_count"]
+
+
+def as_mesh(V: ArrayLike, F: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Check and cast a triangle mesh.
+
+    Parameters
+    ----------
+    V : (n, 3) float or int, array or nested lists
+    F : (m, 3) int, array or nested lists
+
+    Returns
+    -------
+    V : (n, 3) float64, C-contiguous
+        The caller's own array where it is one already: never write to it.
+    F : (m, 3) int64, C-contiguous
+        Likewise.
+
+    Raises
+    ------
+    MeshInputError
+        Wrong shape or dtype, no faces, a vertex of a face that is not finite or does not exist.
+    """
+    vertices = as_vertices(V)
+    faces = as_faces(F, len(vertices))
+    _check_finite(vertices, faces)
+    return vertices, faces
+
+
+def as_vertices(V: ArrayLike) -> NDArray[np.float64]:
+    """Cast to (n, 3) float64."""
+    array = _as_array(V, "V")
+    if array.ndim == 2 and array.shape[1] == 2:
+        raise MeshInputError(
+            f"V has shape {array.shape}, two coordinates a vertex; "
+            "add a third: np.column_stack([V, np.zeros(len(V))])"
+        )
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise MeshInputError(f"V must have shape (n, 3), one vertex a row; got {array.shape}")
+    if array.dtype.kind not in "fiu":
+        raise MeshInputError(f"V must hold real numbers; got dtype {array.dtype}")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def as_faces(F: ArrayLike, n_vertices: int) -> NDArray[np.int64]:
+    """Cast to (m, 3) int64 with indices in ``range(n_vertices)``."""
+    array = _as_array(F, "F")
+    if array.size == 0:
+        raise MeshInputError("F is empty: the mesh has no faces")
+    if array.ndim == 2 and array.shape[1] > 3:
+        raise MeshInputError(
+            f"F has shape {array.shape}: polygons with {array.shape[1]} corners; "
+            "triangulate them first"
+        )
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise MeshInputError(f"F must have shape (m, 3), one triangle a row; got {array.shape}")
+    if array.dtype.kind == "f" and np.array_equal(array, np.rint(array)):
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iu":
+        raise MeshInputError(f"F must hold integer vertex indices; got dtype {array.dtype}")
+    low, high = int(array.min()), int(array.max())
+    if low < 0 or high >= n_vertices:
+        bad = np.flatnonzero(((array < 0) | (array >= n_vertices)).any(axis=1))
+        raise MeshInputError(
+            f"{_which(bad, 'face')} of F name vertices outside 0 to {n_vertices - 1} "
+            f"(indices run from {low} to {high}); indices are 0-based"
+        )
+    return np.ascontiguousarray(array, dtype=np.int64)
+
+
+def positive_count(value: Any, name: str) -> int:
+    """Check an option that counts something, at least one."""
+    from .errors import OptionError
+
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise OptionError(f"{name} must be a whole number, at least 1; got {value!r}")
+    return int(value)
+
+
+def _check_finite(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
+    """Refuse NaN and infinity, but for vertices that no face uses."""
+    if np.isfinite(V.sum()) or np.isfinite(V).all():
+        return
+    is_bad = ~np.isfinite(V).all(axis=1)
+    bad = np.flatnonzero(is_bad & (np.bincount(F.ravel(), minlength=len(V)) > 0))
+    if len(bad):
+        raise MeshInputError(
+            f"{_which(bad, 'vertex')} of V are NaN or infinite; "
+            "remove them and their faces, or repair the coordinates"
+        )
+
+
+def _as_array(value: ArrayLike, name: str) -> NDArray[Any]:
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise MeshInputError(f"{name} is no rectangular array: {error}") from error
+    if array.dtype == object:
+        raise MeshInputError(f"{name} is no rectangular array of numbers (rows of unequal length?)")
+    return array
+
+
+def _which(indices: NDArray[np.intp], noun: str) -> str:
+    """Name some elements: ``3 faces (12, 40, 41)``."""
+    shown = ", ".join(str(i) for i in indices[:5]) + (", ..." if len(indices) > 5 else "")
+    plural = {"vertex": "vertices"}.get(noun, noun + "s")
+    return f"{len(indices)} {plural if len(indices) > 1 else noun} ({shown})"

@@ -1,0 +1,234 @@
+"""The shell command: read a mesh, remesh it, show that it got better, write it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+import remeshvec
+from remeshvec._arguments import DEFAULT_FACTOR, parser
+from remeshvec.errors import OptionError, RemeshvecError
+from remeshvec.mesh_files import (
+    SUFFIXES,
+    MeshFile,
+    check_writable,
+    read_mesh,
+    write_file,
+    write_mesh,
+)
+from remeshvec.quality import quality, side_by_side
+from remeshvec.report import RemeshResult
+
+__all__ = ["main"]
+
+PATIENCE = 1.0  # seconds of silence before progress is shown
+EXIT_ERROR, EXIT_FAILURE, EXIT_INTERRUPTED = 2, 1, 130  # 130 = 128 + SIGINT, as shells have it
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the shell command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit status: 0, 2 for bad input, 130 after Ctrl-C, 1 where memory or the terminal failed.
+    """
+    options = parser().parse_args(argv)
+    try:
+        _run(options)
+        sys.stdout.flush()
+    except RemeshvecError as error:
+        return _failed(str(error), EXIT_ERROR)
+    except KeyboardInterrupt:
+        return _failed("interrupted, nothing more was written", EXIT_INTERRUPTED)
+    except MemoryError:
+        return _failed("there is not enough memory", EXIT_FAILURE)
+    except BrokenPipeError:  # the reader of a pipe has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_FAILURE
+    return 0
+
+
+def _failed(reason: str, status: int) -> int:
+    print(f"remeshvec: {reason}", file=sys.stderr)
+    return status
+
+
+def _run(options: argparse.Namespace) -> None:
+    """Do everything that the arguments ask for."""
+    _check_outputs(options)
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "read"):
+        mesh = read_mesh(options.input)
+    with _progress(options.quiet) as callback:
+        result = remeshvec.remesh(
+            mesh.V, mesh.F, _length(options, mesh), callback=callback, **_library_options(options)
+        )
+    seconds |= result.report.seconds
+    if options.output:
+        with _timed(seconds, "write"):
+            write_mesh(options.output, result.V, result.F)
+    if options.save_stats:
+        _save_stats(options, mesh, result)
+    if options.picture:
+        _make_picture(options, mesh, result)
+    if not options.quiet:
+        _print_report(options, mesh, result, seconds)
+    if options.visualize:
+        from remeshvec import viz
+
+        viz.show((mesh.V, mesh.F), (result.V, result.F), up=options.up)
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    """Refuse before the work starts what could not be written or shown after it."""
+    if options.output:
+        check_writable(options.output, SUFFIXES)
+    if options.save_stats:
+        check_writable(options.save_stats)
+    if options.picture or options.visualize:
+        from remeshvec import viz
+
+        viz.require_viewer(window=options.visualize)
+        if options.picture:
+            check_writable(options.picture, viz.PICTURE_SUFFIXES)
+    named = [options.output, options.save_stats, options.picture]
+    paths = [Path(name).resolve() for name in named if name]
+    if len(set(paths)) < len(paths):
+        raise OptionError("the output, the statistics and the picture need names of their own")
+    if Path(options.input).resolve() in paths[bool(options.output) :]:
+        raise OptionError(f"the statistics or the picture would replace {options.input}")
+
+
+def _length(options: argparse.Namespace, mesh: MeshFile) -> float | None:
+    """Return the target length, None for the library's default."""
+    if options.length is not None or options.l_factor == DEFAULT_FACTOR:
+        return options.length
+    return options.l_factor * quality(mesh.V, mesh.F).edge_mean
+
+
+def _library_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Return those options that were given, so that the presets decide on the others."""
+    given = {
+        "iterations": options.iterations,
+        "foldover": options.foldover,
+        "sliver_check": options.sliver_check,
+        "project": False if options.no_project else None,
+        "threads": options.threads,
+    }
+    return {"preset": options.preset} | {k: v for k, v in given.items() if v is not None}
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[name] = time.perf_counter() - start
+
+
+class Progress:
+    """Tells on a stream how far the work is, once it has lasted longer than `PATIENCE`.
+
+    On a terminal one line is rewritten; elsewhere, in a log, every sweep gets a line.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+        self.rewrites = stream.isatty()
+        self.start = time.perf_counter()
+        self.shown = -1  # the sweep that was told last
+
+    def __call__(self, sweep: int, phase: str, count: int) -> None:
+        """Take note of a phase that is done; the library calls this."""
+        passed = time.perf_counter() - self.start
+        if passed < PATIENCE or (sweep == self.shown and not self.rewrites):
+            return
+        self.shown = sweep
+        text = f"sweep {sweep + 1}, {passed:.0f} s"
+        if self.rewrites:
+            print(f"\r\x1b[K{text}, {phase} {count:,}", end="", file=self.stream, flush=True)
+        else:
+            print(text, file=self.stream, flush=True)
+
+    def clear(self) -> None:
+        """Take the line away."""
+        if self.rewrites and self.shown >= 0:
+            print("\r\x1b[K", end="", file=self.stream, flush=True)
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Progress | None]:
+    if quiet:
+        yield None
+        return
+    progress = Progress(sys.stderr)
+    try:
+        yield progress
+    finally:
+        progress.clear()
+
+
+def _make_picture(options: argparse.Namespace, mesh: MeshFile, result: RemeshResult) -> None:
+    from remeshvec import viz
+
+    viz.picture(options.picture, (mesh.V, mesh.F), (result.V, result.F), up=options.up)
+
+
+def _save_stats(options: argparse.Namespace, mesh: MeshFile, result: RemeshResult) -> None:
+    content = {
+        "input": options.input,
+        "output": options.output,
+        "notices": mesh.notices,
+        **result.report.to_dict(),
+    }
+    write_file(options.save_stats, (json.dumps(_plain(content), indent=2) + "\n").encode())
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON can hold it: NaN and infinity, which it lacks, become null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _print_report(
+    options: argparse.Namespace, mesh: MeshFile, result: RemeshResult, seconds: dict[str, float]
+) -> None:
+    report = result.report
+    for notice in mesh.notices:
+        print(f"note: {notice}")
+    for name, count in report.dirt.items():
+        print(f"note: {name.replace('_', ' ')}: {count:,}")
+    print(
+        f"target length {report.target_length:.4g}, preset {report.preset}, "
+        f"{len(report.sweeps)} sweeps in {seconds['total']:.2f} s; {report.stop}"
+    )
+    print()
+    print(side_by_side(report.quality_before, report.quality_after))
+    print()
+    if options.timing:
+        for name, passed in seconds.items():
+            print(f"{'remesh, total' if name == 'total' else name:<31}{passed:>12.3f} s")
+        print()
+    for path in (options.output, options.save_stats, options.picture):
+        if path:
+            print(f"written: {path}")
+    if not options.output:
+        print("no mesh was written; -o FILE writes it")

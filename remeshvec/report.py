@@ -1,0 +1,126 @@
+"""What a call returns: the mesh, where its vertices come from, and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .options import Options
+from .quality import Quality, quality
+
+__all__ = ["RemeshResult", "Report", "Stopwatch"]
+
+
+class Stopwatch:
+    """Adds up seconds by phase."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._start = perf_counter()
+
+    @contextmanager
+    def time(self, phase: str) -> Iterator[None]:
+        """Add the duration of the block to a phase."""
+        start = perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[phase] = self.seconds.get(phase, 0.0) + perf_counter() - start
+
+    def stop(self) -> dict[str, float]:
+        """Return the seconds by phase, with the total since the watch was made."""
+        return {**self.seconds, "total": perf_counter() - self._start}
+
+
+@dataclass
+class Report:
+    """What happened in a call.
+
+    Attributes
+    ----------
+    target_length : float
+        L, in the units of the input.
+    options : Options
+        The options in force.
+    sweeps : list of dict
+        Counts of edges split, collapsed and flipped, one dict a sweep.
+    seconds : dict
+        Seconds by phase, and "total".
+    stop : str
+        Why the sweeps ended.
+    dirt : dict
+        What was wrong with the input, and how often; empty for a clean mesh.
+    """
+
+    target_length: float
+    options: Options
+    sweeps: list[dict[str, int]]
+    seconds: dict[str, float]
+    stop: str
+    dirt: dict[str, int]
+    before: tuple[ArrayLike, ArrayLike] = field(repr=False)
+    after: tuple[ArrayLike, ArrayLike] = field(repr=False)
+
+    @property
+    def preset(self) -> str:
+        """Name of the preset that the call started from."""
+        return self.options.preset
+
+    @cached_property
+    def quality_before(self) -> Quality:
+        """Quality of the input; computed when first asked for, from the caller's arrays."""
+        return quality(*self.before, L=self.target_length)
+
+    @cached_property
+    def quality_after(self) -> Quality:
+        """Quality of the output; computed when first asked for."""
+        return quality(*self.after, L=self.target_length)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as a JSON-ready dict."""
+        return {
+            "target_length": self.target_length,
+            "preset": self.preset,
+            "options": dict(vars(self.options)),
+            "sweeps": self.sweeps,
+            "seconds": self.seconds,
+            "stop": self.stop,
+            "dirt": self.dirt,
+            "quality_before": self.quality_before.to_dict(),
+            "quality_after": self.quality_after.to_dict(),
+        }
+
+
+@dataclass
+class RemeshResult:
+    """A remeshed surface; unpacks as ``V, F = result``.
+
+    Attributes
+    ----------
+    V : (n, 3)
+        Vertices, in the dtype of the input (float64 for integers).
+    F : (m, 3)
+        Faces, in the dtype of the input.
+    birth_face : (n,) int64
+        Input face on which each vertex lies.
+    birth_barycentric : (n, 3) float64
+        Where on it: ``V = sum(birth_barycentric[:, i] * V_in[F_in[birth_face, i]])`` for vertices
+        that lie on the input, the closest point to them otherwise.
+    report : Report
+    """
+
+    V: NDArray[Any]
+    F: NDArray[Any]
+    birth_face: NDArray[np.int64]
+    birth_barycentric: NDArray[np.float64]
+    report: Report
+
+    def __iter__(self) -> Iterator[NDArray[Any]]:
+        return iter((self.V, self.F))
