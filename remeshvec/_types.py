@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "APEX",
     "BOUNDARY",
     "DEAD",
     "FIXED",
@@ -30,8 +31,9 @@ DEAD = -1  # origin of all three half-edges of a removed face
 
 # Kinds of vertices, in the order of what they may do; a collapse keeps the larger kind.
 INNER = 0  # moves freely
-BOUNDARY = 1  # stays on its boundary loop
-FIXED = 2  # never moves, never vanishes
+APEX = 1  # tip of a horn: held during the sweeps, an inner vertex afterwards
+BOUNDARY = 2  # stays on its boundary loop
+FIXED = 3  # never moves, never vanishes
 
 # Bound for every walk around a vertex. A structure that passed the build always closes sooner; the
 # bound turns a broken one into a wrong answer instead of a hang.
@@ -54,7 +56,7 @@ class Mesh(NamedTuple):
     X : (n, 4) float64
         Coordinates, and in the last column the mixed Voronoi area while relaxing.
     kind : (n,) uint8
-        ``INNER``, ``BOUNDARY`` or ``FIXED``.
+        ``INNER``, ``APEX``, ``BOUNDARY`` or ``FIXED``.
     birth : (n,) int32
         Face of the reference surface on or near which the vertex lies.
     """

@@ -14,11 +14,11 @@ from ._jit import driver, inlined
 from ._types import FloatArray, IndexArray, Tree
 from .geometry import closest_on_triangle
 
-__all__ = ["build_tree", "closest_face"]
+__all__ = ["STACK", "build_tree", "closest_face", "point_on_face"]
 
 _LEAF = 4  # faces in a leaf
 _ARITY = 4  # boxes in a node
-_STACK = 64  # boxes waiting: 3 a level and 16 levels hold 4e9 leaves
+STACK = 64  # boxes waiting: 3 a level and 16 levels hold 4e9 leaves
 
 
 def build_tree(X: FloatArray, F: IndexArray, parallel: bool) -> Tree:
@@ -79,22 +79,33 @@ def face_distance(corners, f, x, y, z):
 
 
 @inlined
-def closest_face(tree, x, y, z, hint, node, depth):
+def point_on_face(corners, f, s, t):
+    """Point of a face from the weights of its corners 1 and 2."""
+    x, y, z = corners[f, 0], corners[f, 1], corners[f, 2]
+    return (
+        x + s * (corners[f, 3] - x) + t * (corners[f, 6] - x),
+        y + s * (corners[f, 4] - y) + t * (corners[f, 7] - y),
+        z + s * (corners[f, 5] - z) + t * (corners[f, 8] - z),
+    )
+
+
+@inlined
+def closest_face(tree, x, y, z, hint, stack):
     """Face closest to a point, with weights of its corners 1 and 2 and the squared distance.
 
     Ties go to the hint, then to the smaller index, so that the answer does not depend on the path.
-    ``node`` and ``depth`` are (64,) int64 scratch.
+    ``stack`` is (2, STACK) int64 scratch: boxes waiting and their levels.
     """
     best = hint
     s, t, distance = face_distance(tree.corners, hint, x, y, z)
     top = tree.level.size - 2
-    node[0] = 0
-    depth[0] = top
+    stack[0, 0] = 0
+    stack[1, 0] = top
     size = 1
     while size > 0:
         size -= 1
-        i = node[size]
-        d = depth[size]
+        i = stack[0, size]
+        d = stack[1, size]
         if d == 0:
             for f in range(_LEAF * i, min(_LEAF * i + _LEAF, tree.corners.shape[0])):
                 if f != hint:
@@ -106,7 +117,7 @@ def closest_face(tree, x, y, z, hint, node, depth):
         end = min(start + _ARITY * i + _ARITY, tree.level[d])
         for j in range(start + _ARITY * i, end):
             if _box_distance(tree.boxes, j, x, y, z) < distance:
-                node[size] = j - start
-                depth[size] = d - 1
+                stack[0, size] = j - start
+                stack[1, size] = d - 1
                 size += 1
     return best, s, t, distance

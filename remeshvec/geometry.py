@@ -11,15 +11,24 @@ from math import sqrt
 from ._jit import inlined
 
 __all__ = [
+    "SHARP",
     "angle_from_cosine",
     "closest_on_segment",
     "closest_on_triangle",
+    "corner_angles",
     "distance_squared",
     "face_vector",
     "mean_ratio",
     "mixed_voronoi_areas",
+    "tangent_basis",
     "turn_exceeds",
 ]
+
+
+# A vertex is sharp where its normals cancel: their weighted sum is shorter than this share of what it
+# would be on a plane (a fold of 60 degrees to each side; 0.71 on the edge of a cube, 0.58 at its
+# corner).
+SHARP = 0.3
 
 
 @inlined
@@ -102,6 +111,31 @@ def angle_from_cosine(cosine):
         x = 1.0
     angle = sqrt(1.0 - x) * (1.5707288 + x * (-0.2121144 + x * (0.0742610 - 0.0187293 * x)))
     return 3.141592653589793 - angle if cosine < 0.0 else angle
+
+
+@inlined
+def corner_angles(X, a, b, c):
+    """Angles of a triangle to 1e-4 rad, the third as what is missing to pi; 0 where an edge has no length."""
+    ux, uy, uz = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
+    vx, vy, vz = X[c, 0] - X[a, 0], X[c, 1] - X[a, 1], X[c, 2] - X[a, 2]
+    uu = ux * ux + uy * uy + uz * uz
+    vv = vx * vx + vy * vy + vz * vz
+    uv = ux * vx + uy * vy + uz * vz
+    ww = uu + vv - 2.0 * uv
+    if not (uu > 0.0 and vv > 0.0 and ww > 0.0):
+        return 0.0, 0.0, 0.0
+    angle_a = angle_from_cosine(uv / sqrt(uu * vv))
+    angle_b = angle_from_cosine((uu - uv) / sqrt(uu * ww))
+    return angle_a, angle_b, max(0.0, 3.141592653589793 - angle_a - angle_b)
+
+
+@inlined
+def tangent_basis(nx, ny, nz):
+    """Two unit vectors normal to a unit vector and to each other [Duff et al. 2017]."""
+    sign = 1.0 if nz >= 0.0 else -1.0
+    p = -1.0 / (sign + nz)
+    q = nx * ny * p
+    return 1.0 + sign * nx * nx * p, sign * q, -sign * nx, q, sign + ny * ny * p, -ny
 
 
 @inlined

@@ -36,6 +36,7 @@ class BuildReport(NamedTuple):
     non_manifold_edges: int  # more than two faces
     inconsistent_edges: int  # two faces that run the edge in the same direction
     pinched_vertices: int  # vertices that held several fans
+    doubled_faces: int  # faces that share two edges with another: same corners, opposite winding
 
 
 def build_mesh(X: FloatArray, F: IndexArray) -> tuple[Mesh, BuildReport]:
@@ -69,10 +70,10 @@ def build_mesh(X: FloatArray, F: IndexArray) -> tuple[Mesh, BuildReport]:
         np.zeros(n_fans, np.uint8),
         np.zeros(n_fans, np.int32),
     )
-    _fill_vertices(mesh)
+    doubled = _fill_vertices(mesh)
     mesh.kind[:n][is_cut != 0] = FIXED
     mesh.kind[n:][is_cut[source] != 0] = FIXED
-    return mesh, BuildReport(non_manifold, inconsistent, len(np.unique(source)))
+    return mesh, BuildReport(non_manifold, inconsistent, len(np.unique(source)), doubled)
 
 
 @kernel
@@ -163,7 +164,8 @@ def _split_fans(origin, twin, n, source):
 
 @kernel
 def _fill_vertices(mesh):
-    """Set ``vertex_halfedge``, kinds and valences from origins and twins."""
+    """Set ``vertex_halfedge``, kinds and valences from origins and twins; counts doubled faces."""
+    doubled = 0
     for v in range(mesh.vertex_halfedge.size):
         mesh.valence_excess[v] = -6
         mesh.kind[v] = INNER
@@ -176,5 +178,9 @@ def _fill_vertices(mesh):
             mesh.vertex_halfedge[v] = h
             mesh.kind[v] = BOUNDARY
             mesh.valence_excess[v] += 3
-        elif mesh.kind[v] == INNER:
-            mesh.vertex_halfedge[v] = h
+        else:
+            if mesh.kind[v] == INNER:
+                mesh.vertex_halfedge[v] = h
+            if mesh.twin[h] // 3 == mesh.twin[following(h)] // 3:
+                doubled += 1
+    return doubled

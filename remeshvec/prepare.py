@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+from math import floor, isfinite, log2, sqrt
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._jit import kernel
-from ._types import FIXED, NONE, FloatArray, Mesh
-from .boundary import boundary_corners, link_boundary
+from ._types import APEX, FIXED, NONE, FloatArray, Mesh
+from .boundary import link_boundary
 from .bvh import build_tree
 from .clean import drop_degenerate_faces, drop_duplicate_faces, weld_vertices
 from .errors import MeshInputError, OptionError
+from .features import apexes, boundary_corners
 from .geometry import distance_squared, face_vector
 from .halfedge import BuildReport, build_mesh, following
 from .operations.project import Reference
 from .order import Ordered, order_mesh
 
 __all__ = ["Prepared", "build_reference", "choose_length", "prepare"]
+
+
+# Longest target length in the frame of `Prepared`, where the mesh has an extent below 2: longer ones
+# mean the same, and their squares might overflow.
+_LONGEST = 1e6
 
 
 class Prepared(NamedTuple):
@@ -46,7 +54,7 @@ def prepare(V: FloatArray, F: NDArray[np.int64], parallel: bool) -> Prepared:
     source = np.arange(len(F))
     F32, source = _filter(F32, source, drop_degenerate_faces(F32), dirt, "degenerate_faces")
     ordered, mesh, found = _connect(V, F32, parallel)
-    if found.non_manifold_edges or found.inconsistent_edges:
+    if found.non_manifold_edges or found.inconsistent_edges or found.doubled_faces:
         kept = drop_duplicate_faces(F32)
         if kept is not None:
             F32, source = _filter(F32, source, kept, dirt, "duplicate_faces")
@@ -60,8 +68,8 @@ def prepare(V: FloatArray, F: NDArray[np.int64], parallel: bool) -> Prepared:
         F32, source = _filter(F32, source, drop_degenerate_faces(F32), dirt, "degenerate_faces")
         F32, source = _filter(F32, source, drop_duplicate_faces(F32), dirt, "duplicate_faces")
         ordered, mesh, found = _connect(V, F32, parallel)
-    for name, count in found._asdict().items():
-        _note(dirt, name, count)
+    for name in ("non_manifold_edges", "inconsistent_edges", "pinched_vertices"):
+        _note(dirt, name, getattr(found, name))
     mesh.birth[:] = mesh.vertex_halfedge
     return Prepared(mesh, source[ordered.face_source], centre, scale, dirt)
 
@@ -80,7 +88,9 @@ def choose_length(prepared: Prepared, L: float | None, max_faces: int) -> float:
     if not area > 0.0:
         raise MeshInputError("all faces of F have no area: there is no surface to remesh")
     length = 0.9 * mean_edge if L is None else _positive(L) * prepared.scale
-    expected = area / (np.sqrt(3.0) / 4.0 * length * length)
+    if length == 0.0:
+        length = 5e-324  # refused below; a product that underflows is no longer zero
+    expected = area / length / length / (sqrt(3.0) / 4.0)
     if not expected <= max_faces:
         raise OptionError(
             f"L = {length / prepared.scale:g} would give about {expected:.3g} faces, more than "
@@ -93,15 +103,17 @@ def choose_length(prepared: Prepared, L: float | None, max_faces: int) -> float:
             f"L = {length / prepared.scale:g} is below the precision of coordinates near "
             f"{coordinate / prepared.scale:g}; move the mesh to the origin"
         )
-    return float(length)
+    return min(length, _LONGEST)
 
 
 def build_reference(mesh: Mesh, length: float, parallel: bool) -> Reference:
-    """Build the surface to project on, from a mesh before its first sweep; fixes boundary corners."""
+    """Build the surface to project on, from a mesh before its first sweep; fixes corners and apexes."""
     X = mesh.X.copy()
     origin = mesh.origin.copy()
     links = link_boundary(mesh)
+    tips = apexes(mesh, length)
     mesh.kind[boundary_corners(mesh, links, length)] = FIXED
+    mesh.kind[tips] = APEX
     tree = build_tree(X, origin.reshape(-1, 3), parallel)
     return Reference(tree, X, origin, links)
 
@@ -141,26 +153,24 @@ def _to_frame(V: FloatArray, used: FloatArray) -> tuple[FloatArray, FloatArray, 
     of squares of lengths in range for any unit.
     """
     low, high = used.min(axis=0), used.max(axis=0)
-    extent = float((high - low).max())
+    with np.errstate(over="ignore"):
+        extent = float((high - low).max())
     if not extent > 0.0:
         raise MeshInputError("all vertices of V lie in one place: there is no surface to remesh")
     if not np.isfinite(extent):
         raise MeshInputError("the extent of V exceeds the range of float64; scale it down")
     middle = 0.5 * low + 0.5 * high
     centre = middle if np.abs(middle).max() > 4.0 * extent else np.zeros(3)
-    scale = float(2.0 ** -np.floor(np.log2(extent)))
+    scale = 2.0 ** min(1000, -floor(log2(extent)))
     with np.errstate(invalid="ignore", over="ignore"):  # vertices that no face uses may be anything
         return np.ascontiguousarray((V - centre) * scale), centre, scale
 
 
 def _positive(L: float) -> float:
-    try:
-        length = float(L)
-    except (TypeError, ValueError):
-        length = float("nan")
-    if not (np.isfinite(length) and length > 0.0):
+    is_number = isinstance(L, Real) and not isinstance(L, bool | np.bool_)
+    if not is_number or not isfinite(L) or not L > 0.0:
         raise OptionError(f"L must be a positive length in the units of V; got {L!r}")
-    return length
+    return float(L)
 
 
 @kernel

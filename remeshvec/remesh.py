@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._check import as_mesh, positive_count
 from ._jit import compile_notice, thread_scope
-from ._types import Blocks, FloatArray, Mesh
+from ._types import APEX, INNER, Blocks, FloatArray, Mesh
 from .edge_sets import make_blocks
 from .operations.collapse import CollapseLimits, collapse_short_edges
 from .operations.fit import fit_vertices
@@ -20,6 +20,7 @@ from .operations.project import Reference, locate_vertices, project_boundary, pr
 from .operations.relax import RelaxOptions, relax_vertices
 from .operations.split import MAX_ROUNDS, compact, split_long_edges
 from .operations.untangle import untangle_vertices
+from .errors import OptionError
 from .options import Options, make_options
 from .prepare import Prepared, build_reference, choose_length, prepare
 from .report import RemeshResult, Report, Stopwatch
@@ -69,8 +70,8 @@ def remesh(
     L : float, optional
         Target edge length in the units of ``V``; 0.9 times the mean edge length by default.
     preset : {"default", "fast", "fine"}
-        ``"default"``: eight sweeps with tightening thresholds, vertices on the input. ``"fast"``: the
-        published algorithm, five sweeps. ``"fine"``: twelve sweeps and the fit.
+        ``"default"``: twelve sweeps with loosening thresholds, vertices on the input. ``"fast"``: the
+        published algorithm, five sweeps. ``"fine"``: sixteen sweeps and the fit.
     iterations : int, optional
         Sweeps; threshold schedules are stretched over them.
     split, collapse : float or sequence of float, optional
@@ -85,7 +86,7 @@ def remesh(
         Whether vertices end on the input surface; True by default. ``False`` is the algorithm as
         published, which lets them drift.
     untangle_angle : float, optional
-        Degrees; triangles with a smaller angle are improved at the end. 43 by default, except for the
+        Degrees; triangles with a smaller angle are improved at the end. 41.5 by default, except for the
         preset ``"fast"``, which does not.
     fit : bool, optional
         Let vertices leave the input by up to 0.2 L so that faces straddle it: about a quarter less RMS
@@ -130,6 +131,8 @@ def remesh(
         },
     )
     max_faces = positive_count(max_faces, "max_faces")
+    if callback is not None and not callable(callback):
+        raise OptionError(f"callback must be callable; got {callback!r}")
     with watch.time("check"):
         vertices, faces = as_mesh(V, F)
     with compile_notice(), thread_scope(options.threads) as may_run:
@@ -154,13 +157,15 @@ def remesh(
 def _extract(
     mesh: Mesh, prepared: Prepared, vertex_dtype: np.dtype[Any], face_dtype: np.dtype[Any]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Arrays in the caller's units and dtypes; integer coordinates come back as float64."""
+    """Arrays in the caller's units and dtypes.
+
+    Integer coordinates come back as float64, indices too many for the caller's dtype as int64.
+    """
     V = mesh.X[:, :3] / prepared.scale + prepared.centre
     F = mesh.origin.reshape(-1, 3)
-    return (
-        V.astype(vertex_dtype if vertex_dtype.kind == "f" else np.float64),
-        F.astype(face_dtype if face_dtype.kind in "iu" else np.int64),
-    )
+    if face_dtype.kind not in "iu" or len(V) - 1 > np.iinfo(face_dtype).max:
+        face_dtype = np.dtype(np.int64)
+    return V.astype(vertex_dtype if vertex_dtype.kind == "f" else np.float64), F.astype(face_dtype)
 
 
 class _Run:
@@ -252,15 +257,15 @@ class _Run:
         with self.watch.time("extract"):
             mesh = compact(mesh, make_blocks(mesh), parallel)
             blocks = make_blocks(mesh)
+            mesh.kind[mesh.kind == APEX] = INNER
         with self.watch.time("finish"):
+            if options.project:  # the sweeps may have been cancelled, and tips were held
+                project_vertices(mesh, blocks, reference, parallel)
+            cosine = cos(radians(options.untangle_angle))
             for _ in range(options.untangle_rounds):
-                untangle_vertices(mesh, blocks, cos(radians(options.untangle_angle)), parallel)
-                if options.project:
-                    project_vertices(mesh, blocks, reference, parallel)
+                untangle_vertices(mesh, blocks, reference.tree, options.project, cosine, parallel)
             for _ in range(options.fit_rounds):
                 fit_vertices(mesh, blocks, reference.tree, 0.2 * length, parallel)
-            if self.stop == "cancelled" and options.project:
-                project_vertices(mesh, blocks, reference, parallel)
         with self.watch.time("locate"):
             barycentric = locate_vertices(mesh, blocks, reference, parallel)
         return mesh, barycentric

@@ -14,9 +14,9 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined
-from .._types import DEAD, FIXED, INNER, NONE, Blocks, Mesh
+from .._types import APEX, DEAD, FIXED, INNER, NONE, Blocks, Mesh
 from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
-from ..geometry import distance_squared, face_vector, mean_ratio, turn_exceeds
+from ..geometry import SHARP, distance_squared, face_vector, mean_ratio, turn_exceeds
 from ..halfedge import following, previous
 
 __all__ = ["CollapseLimits", "collapse_short_edges"]
@@ -56,7 +56,7 @@ def collapse_short_edges(
     """Collapse edges shorter than ``limits.shortest``; returns counts by outcome."""
     candidates = np.empty(mesh.origin.size, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _find_short_edges(parallel, mesh, blocks, limits.shortest**2, candidates, count)
+    _find_short_edges(parallel, mesh, blocks, limits.shortest * limits.shortest, candidates, count)
     tally = np.zeros((len(count), N_OUTCOMES), np.int64)
     if count.any():
         for stage in stages(blocks):
@@ -148,11 +148,12 @@ def _collapse_edge(mesh, h, low, high, limits, faces, ring):
 
 @inlined
 def keeps_boundary(mesh, h, a, b):
-    """Guard: fixed vertices stay, and no inner edge joins two parts of the boundary.
+    """Guard: fixed vertices and tips stay, and no inner edge joins two parts of the boundary.
 
     A boundary edge may go unless its face hangs on it alone.
     """
-    if mesh.kind[a] == FIXED and mesh.kind[b] == FIXED:
+    kind = min(mesh.kind[a], mesh.kind[b])
+    if kind == FIXED or kind == APEX:
         return False
     on_a = mesh.twin[mesh.vertex_halfedge[a]] == NONE
     on_b = mesh.twin[mesh.vertex_halfedge[b]] == NONE
@@ -209,17 +210,44 @@ def keeps_link(mesh, h, ring_a, n_a, m_a, ring_b, n_b, m_b):
 
 @inlined
 def _position(mesh, a, b, reach, faces, n_a, n_b):
-    """Where the two ends meet: at the more constrained one, else midpoint or quadric point."""
+    """Where the two ends meet: at the more constrained or sharper one, else midpoint or quadric."""
     if mesh.kind[a] > mesh.kind[b]:
         return mesh.X[a, 0], mesh.X[a, 1], mesh.X[a, 2]
     if mesh.kind[b] > mesh.kind[a]:
         return mesh.X[b, 0], mesh.X[b, 1], mesh.X[b, 2]
+    if mesh.kind[a] == INNER:
+        sharp_a = _is_sharp(mesh, faces[0], n_a)
+        sharp_b = _is_sharp(mesh, faces[1], n_b)
+        if sharp_a and not sharp_b:
+            return mesh.X[a, 0], mesh.X[a, 1], mesh.X[a, 2]
+        if sharp_b and not sharp_a:
+            return mesh.X[b, 0], mesh.X[b, 1], mesh.X[b, 2]
     x = 0.5 * (mesh.X[a, 0] + mesh.X[b, 0])
     y = 0.5 * (mesh.X[a, 1] + mesh.X[b, 1])
     z = 0.5 * (mesh.X[a, 2] + mesh.X[b, 2])
     if reach <= 0.0 or mesh.kind[a] != INNER:
         return x, y, z
     return _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b)
+
+
+@inlined
+def _is_sharp(mesh, faces, n):
+    """Tell whether the normals around a vertex cancel, as on the rim of a sheet."""
+    X = mesh.X
+    sx = sy = sz = total = 0.0
+    for i in range(n):
+        h = faces[i]
+        u = mesh.origin[h]
+        v = mesh.origin[following(h)]
+        w = mesh.origin[previous(h)]
+        nx, ny, nz = face_vector(
+            X[u, 0], X[u, 1], X[u, 2], X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2]
+        )
+        sx += nx
+        sy += ny
+        sz += nz
+        total += sqrt(nx * nx + ny * ny + nz * nz)
+    return sx * sx + sy * sy + sz * sz < SHARP * SHARP * total * total
 
 
 @inlined

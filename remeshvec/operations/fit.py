@@ -14,7 +14,7 @@ from numba import prange
 
 from .._jit import driver
 from .._types import DEAD, INNER, MAX_VALENCE, NONE, Blocks, Mesh, Tree
-from ..bvh import closest_face
+from ..bvh import STACK, closest_face, point_on_face
 from ..geometry import face_vector
 from ..halfedge import previous
 
@@ -35,8 +35,7 @@ def _measure_gaps(mesh, blocks, tree, gaps):
     """Area vector of every face, and area times signed distance from its centroid to the input."""
     X = mesh.X
     for k in prange(blocks.face.size - 1):
-        node = np.empty(64, np.int64)
-        depth = np.empty(64, np.int64)
+        stack = np.empty((2, STACK), np.int64)
         for f in range(blocks.face[k], blocks.face[k + 1]):
             a = mesh.origin[3 * f]
             b = mesh.origin[3 * f + 1]
@@ -49,14 +48,9 @@ def _measure_gaps(mesh, blocks, tree, gaps):
             x = (X[a, 0] + X[b, 0] + X[c, 0]) / 3.0
             y = (X[a, 1] + X[b, 1] + X[c, 1]) / 3.0
             z = (X[a, 2] + X[b, 2] + X[c, 2]) / 3.0
-            g, s, t, _ = closest_face(tree, x, y, z, np.int64(mesh.birth[a]) // 3, node, depth)
-            gap = 0.0
-            for i in range(3):
-                q = tree.corners[g, i]
-                q += s * (tree.corners[g, 3 + i] - q) + t * (tree.corners[g, 6 + i] - q)
-                gap += (q - (x if i == 0 else (y if i == 1 else z))) * (
-                    nx if i == 0 else (ny if i == 1 else nz)
-                )
+            g, s, t, _ = closest_face(tree, x, y, z, np.int64(mesh.birth[a]) // 3, stack)
+            qx, qy, qz = point_on_face(tree.corners, g, s, t)
+            gap = (qx - x) * nx + (qy - y) * ny + (qz - z) * nz
             gaps[f, 0], gaps[f, 1], gaps[f, 2], gaps[f, 3] = nx, ny, nz, gap
 
 

@@ -15,7 +15,7 @@ from numba import prange
 from .._jit import driver
 from .._types import BOUNDARY, DEAD, INNER, NONE, Blocks, FloatArray, IndexArray, Mesh, Tree
 from ..boundary import closest_on_boundary
-from ..bvh import closest_face
+from ..bvh import STACK, closest_face, point_on_face
 from ..halfedge import following
 
 __all__ = ["Reference", "locate_vertices", "project_boundary", "project_vertices"]
@@ -59,17 +59,14 @@ def locate_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: 
 @driver
 def _project_inner(mesh, blocks, tree, X, birth):
     for k in prange(blocks.vertex.size - 1):
-        node = np.empty(64, np.int64)
-        depth = np.empty(64, np.int64)
+        stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != INNER:
                 continue
             hint = np.int64(birth[v]) // 3
-            f, s, t, _ = closest_face(tree, X[v, 0], X[v, 1], X[v, 2], hint, node, depth)
+            f, s, t, _ = closest_face(tree, X[v, 0], X[v, 1], X[v, 2], hint, stack)
             birth[v] = 3 * f
-            for i in range(3):
-                a = tree.corners[f, i]
-                X[v, i] = a + s * (tree.corners[f, 3 + i] - a) + t * (tree.corners[f, 6 + i] - a)
+            X[v, 0], X[v, 1], X[v, 2] = point_on_face(tree.corners, f, s, t)
 
 
 @driver
@@ -91,15 +88,14 @@ def _project_boundary(mesh, blocks, X_in, origin, links, X, birth):
 @driver
 def _locate(mesh, blocks, tree, X_in, origin, links, birth, barycentric):
     for k in prange(blocks.vertex.size - 1):
-        node = np.empty(64, np.int64)
-        depth = np.empty(64, np.int64)
+        stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD:
                 continue
             x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
             hint = np.int64(birth[v])
             if mesh.twin[mesh.vertex_halfedge[v]] != NONE:
-                f, s, t, _ = closest_face(tree, x, y, z, hint // 3, node, depth)
+                f, s, t, _ = closest_face(tree, x, y, z, hint // 3, stack)
                 birth[v] = 3 * f
                 barycentric[v, 0] = 1.0 - s - t
                 barycentric[v, 1] = s

@@ -17,13 +17,13 @@ from numba import prange
 
 from .._jit import driver, inlined, kernel
 from .._types import BOUNDARY, DEAD, INNER, MAX_VALENCE, NONE, Blocks, Mesh
-from ..geometry import angle_from_cosine, face_vector, mixed_voronoi_areas
+from ..geometry import SHARP, corner_angles, face_vector, mixed_voronoi_areas, tangent_basis
 from ..halfedge import following, previous
 
 __all__ = ["RelaxOptions", "relax_vertices"]
 
-# Columns of the sums: weights, weighted positions, normal, normal tensor (xx xy xz yy yz zz), its
-# weight; padded to two cache lines.
+# Columns of the sums: weights, weighted positions, normal, its weight, normal tensor (xx xy xz yy yz
+# zz), its weight; padded to two cache lines.
 N_SUMS = 16
 
 
@@ -131,37 +131,20 @@ def _add_face(X, a, b, c, options, sums):
     _add_neighbour(X, a, b, sums)
     _add_neighbour(X, b, c, sums)
     _add_neighbour(X, c, a, sums)
-    wa = wb = wc = 1.0
-    norm = 0.0
-    if options.angle_normals or options.stiffness > 0.0:
-        norm = sqrt(nx * nx + ny * ny + nz * nz)
-        if norm == 0.0:
-            return
+    norm = sqrt(nx * nx + ny * ny + nz * nz)
+    if norm == 0.0:
+        return
+    ux, uy, uz = nx / norm, ny / norm, nz / norm
+    wa = wb = wc = norm
     if options.angle_normals:
-        wa, wb, wc = _corner_angles(X, a, b, c)
-        wa, wb, wc = wa / norm, wb / norm, wc / norm
-    _add_normal(sums, a, wa, nx, ny, nz)
-    _add_normal(sums, b, wb, nx, ny, nz)
-    _add_normal(sums, c, wc, nx, ny, nz)
+        wa, wb, wc = corner_angles(X, a, b, c)
+    _add_normal(sums, a, wa, ux, uy, uz)
+    _add_normal(sums, b, wb, ux, uy, uz)
+    _add_normal(sums, c, wc, ux, uy, uz)
     if options.stiffness > 0.0:
-        ux, uy, uz = nx / norm, ny / norm, nz / norm
         _add_tensor(sums, a, ux, uy, uz, nx, ny, nz, norm)
         _add_tensor(sums, b, ux, uy, uz, nx, ny, nz, norm)
         _add_tensor(sums, c, ux, uy, uz, nx, ny, nz, norm)
-
-
-@inlined
-def _corner_angles(X, a, b, c):
-    """Angles of a triangle, the third as what is missing to pi."""
-    ux, uy, uz = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
-    vx, vy, vz = X[c, 0] - X[a, 0], X[c, 1] - X[a, 1], X[c, 2] - X[a, 2]
-    uu = ux * ux + uy * uy + uz * uz
-    vv = vx * vx + vy * vy + vz * vz
-    uv = ux * vx + uy * vy + uz * vz
-    ww = uu + vv - 2.0 * uv
-    angle_a = angle_from_cosine(uv / sqrt(uu * vv))
-    angle_b = angle_from_cosine((uu - uv) / sqrt(uu * ww))
-    return angle_a, angle_b, max(0.0, 3.141592653589793 - angle_a - angle_b)
 
 
 @inlined
@@ -174,21 +157,22 @@ def _add_neighbour(X, v, w, sums):
 
 
 @inlined
-def _add_normal(sums, v, weight, nx, ny, nz):
-    sums[v, 4] += weight * nx
-    sums[v, 5] += weight * ny
-    sums[v, 6] += weight * nz
+def _add_normal(sums, v, weight, ux, uy, uz):
+    sums[v, 4] += weight * ux
+    sums[v, 5] += weight * uy
+    sums[v, 6] += weight * uz
+    sums[v, 7] += weight
 
 
 @inlined
 def _add_tensor(sums, v, ux, uy, uz, nx, ny, nz, norm):
-    sums[v, 7] += ux * nx
-    sums[v, 8] += ux * ny
-    sums[v, 9] += ux * nz
-    sums[v, 10] += uy * ny
-    sums[v, 11] += uy * nz
-    sums[v, 12] += uz * nz
-    sums[v, 13] += norm
+    sums[v, 8] += ux * nx
+    sums[v, 9] += ux * ny
+    sums[v, 10] += ux * nz
+    sums[v, 11] += uy * ny
+    sums[v, 12] += uy * nz
+    sums[v, 13] += uz * nz
+    sums[v, 14] += norm
 
 
 @driver
@@ -233,9 +217,10 @@ def _move(mesh, blocks, options, sums, X):
 
 @inlined
 def _move_vertex(X, v, sums, stiffness):
+    # A vertex on a sharp edge has no tangent plane: it stays, or the rim of a sheet would creep inwards.
     nx, ny, nz = sums[v, 4], sums[v, 5], sums[v, 6]
     norm = sqrt(nx * nx + ny * ny + nz * nz)
-    if not (sums[v, 0] > 0.0 and norm > 0.0):
+    if not (sums[v, 0] > 0.0 and norm > SHARP * sums[v, 7]):
         return
     nx /= norm
     ny /= norm
@@ -247,7 +232,7 @@ def _move_vertex(X, v, sums, stiffness):
     dx -= along * nx
     dy -= along * ny
     dz -= along * nz
-    if stiffness > 0.0 and sums[v, 13] > 0.0:
+    if stiffness > 0.0 and sums[v, 14] > 0.0:
         dx, dy, dz = _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness)
     X[v, 0] += dx
     X[v, 1] += dy
@@ -260,21 +245,16 @@ def _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness):
 
     Across a curved ridge Q is large and the vertex stays on it; along the ridge it still slides.
     """
-    scale = 1.0 / sums[v, 13]
-    xx, xy, xz = sums[v, 7] * scale, sums[v, 8] * scale, sums[v, 9] * scale
-    yy, yz, zz = sums[v, 10] * scale, sums[v, 11] * scale, sums[v, 12] * scale
+    scale = 1.0 / sums[v, 14]
+    xx, xy, xz = sums[v, 8] * scale, sums[v, 9] * scale, sums[v, 10] * scale
+    yy, yz, zz = sums[v, 11] * scale, sums[v, 12] * scale, sums[v, 13] * scale
     # The share of the tensor outside the normal; below 1e-3 the ring is flat to 2 degrees.
     along = (
         nx * (xx * nx + 2.0 * (xy * ny + xz * nz)) + ny * (yy * ny + 2.0 * yz * nz) + nz * zz * nz
     )
     if xx + yy + zz - along < 1e-3:
         return dx, dy, dz
-    # A basis of the tangent plane [Duff et al. 2017].
-    sign = 1.0 if nz >= 0.0 else -1.0
-    p = -1.0 / (sign + nz)
-    q = nx * ny * p
-    sx, sy, sz = 1.0 + sign * nx * nx * p, sign * q, -sign * nx
-    tx, ty, tz = q, sign + ny * ny * p, -ny
+    sx, sy, sz, tx, ty, tz = tangent_basis(nx, ny, nz)
     qs_x, qs_y, qs_z = (
         xx * sx + xy * sy + xz * sz,
         xy * sx + yy * sy + yz * sz,

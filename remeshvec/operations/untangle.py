@@ -13,8 +13,10 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined
-from .._types import DEAD, INNER, NONE, Blocks, Mesh
+from .._types import DEAD, INNER, NONE, Blocks, Mesh, Tree
+from ..bvh import STACK, closest_face, point_on_face
 from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
+from ..geometry import face_vector, tangent_basis, turn_exceeds
 from ..halfedge import following, previous
 
 __all__ = ["untangle_vertices"]
@@ -32,15 +34,23 @@ _DIRECTIONS = np.stack(
 )
 
 
-def untangle_vertices(mesh: Mesh, blocks: Blocks, cosine: float, parallel: bool) -> int:
-    """Improve rings with an angle below ``acos(cosine)``; returns how many vertices moved."""
+def untangle_vertices(
+    mesh: Mesh, blocks: Blocks, tree: Tree, on_surface: bool, cosine: float, parallel: bool
+) -> int:
+    """Improve rings with an angle below ``acos(cosine)``; returns how many vertices moved.
+
+    With ``on_surface`` every trial position is the closest point of the reference surface, so that
+    no projection spoils afterwards what was gained.
+    """
     candidates = np.empty(mesh.vertex_halfedge.size, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
     _find_bad_rings(parallel, mesh, blocks, cosine, candidates, count)
     moved = np.zeros(len(count), np.int64)
     if count.any():
         for stage in stages(blocks):
-            _untangle(parallel, mesh, blocks, stage, cosine, candidates, count, moved)
+            _untangle(
+                parallel, mesh, blocks, stage, tree, on_surface, cosine, candidates, count, moved
+            )
     return int(moved.sum())
 
 
@@ -57,18 +67,19 @@ def _find_bad_rings(mesh, blocks, cosine, candidates, count):
             )
             if n > 0:
                 x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
-                if _largest_cosine(ring, n, x, y, z, 0.0, 0.0, 0.0) > cosine:
+                if _largest_cosine(ring, n, x, y, z, x, y, z) > cosine:
                     candidates[end] = v
                     end += 1
         count[k] = end - blocks.vertex[k]
 
 
 @driver
-def _untangle(mesh, blocks, stage, cosine, candidates, count, moved):
+def _untangle(mesh, blocks, stage, tree, on_surface, cosine, candidates, count, moved):
     for k in prange(stage_blocks(blocks, stage)):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
         ring = np.empty((_CAPACITY, 3))
+        stack = np.empty((2, STACK), np.int64)
         for j in range(first, end):
             for i in range(blocks.vertex[j], blocks.vertex[j] + count[j]):
                 v = np.int64(candidates[i])
@@ -79,7 +90,9 @@ def _untangle(mesh, blocks, stage, cosine, candidates, count, moved):
                 )
                 if n > 0:
                     candidates[i] = DONE
-                    moved[k] += _search(mesh.X, v, ring, n, cosine)
+                    moved[k] += _search(
+                        mesh.X, mesh.birth, v, ring, n, tree, on_surface, cosine, stack
+                    )
 
 
 @inlined
@@ -103,8 +116,12 @@ def _copy_ring(origin, twin, vertex_halfedge, X, v, low, high, ring):
 
 
 @inlined
-def _largest_cosine(ring, n, x, y, z, nx, ny, nz):
-    """Cosine of the smallest angle around (x, y, z); 2 where a face turns away from the normal."""
+def _largest_cosine(ring, n, x, y, z, x0, y0, z0):
+    """Cosine of the smallest angle around (x, y, z).
+
+    2 where a face has no area or turns by more than 60 degrees against the ring around (x0, y0, z0).
+    Against the vertex normal instead, rings around tips never improve: they have faces on all sides.
+    """
     worst = -1.0
     px, py, pz = ring[n - 1, 0] - x, ring[n - 1, 1] - y, ring[n - 1, 2] - z
     pp = px * px + py * py + pz * pz
@@ -112,9 +129,6 @@ def _largest_cosine(ring, n, x, y, z, nx, ny, nz):
         qx, qy, qz = ring[i, 0] - x, ring[i, 1] - y, ring[i, 2] - z
         qq = qx * qx + qy * qy + qz * qz
         pq = px * qx + py * qy + pz * qz
-        turn = nx * (py * qz - pz * qy) + ny * (pz * qx - px * qz) + nz * (px * qy - py * qx)
-        if turn < 0.0:
-            return 2.0
         rr = pp + qq - 2.0 * pq
         # The smallest angle lies opposite the shortest side.
         if rr <= pp and rr <= qq:
@@ -123,15 +137,23 @@ def _largest_cosine(ring, n, x, y, z, nx, ny, nz):
             cosine = (qq - pq) / sqrt(qq * rr)
         else:
             cosine = (pp - pq) / sqrt(pp * rr)
-        if not cosine <= 1.0:
+        if not cosine < 1.0:
             return 2.0
         worst = max(worst, cosine)
+        if x != x0 or y != y0 or z != z0:
+            j = i - 1 if i > 0 else n - 1
+            ox, oy, oz = face_vector(
+                x0, y0, z0, ring[j, 0], ring[j, 1], ring[j, 2], ring[i, 0], ring[i, 1], ring[i, 2]
+            )
+            nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+            if ox * ox + oy * oy + oz * oz > 0.0 and turn_exceeds(ox, oy, oz, nx, ny, nz, 0.5):
+                return 2.0
         px, py, pz, pp = qx, qy, qz, qq
     return worst
 
 
 @inlined
-def _search(X, v, ring, n, cosine):
+def _search(X, birth, v, ring, n, tree, on_surface, cosine, stack):
     """Pattern search; returns 1 if the vertex moved."""
     x, y, z = X[v, 0], X[v, 1], X[v, 2]
     nx = ny = nz = length = 0.0
@@ -147,32 +169,33 @@ def _search(X, v, ring, n, cosine):
     norm = sqrt(nx * nx + ny * ny + nz * nz)
     if norm == 0.0:
         return 0
-    nx, ny, nz = nx / norm, ny / norm, nz / norm
-    # A basis of the tangent plane [Duff et al. 2017].
-    sign = 1.0 if nz >= 0.0 else -1.0
-    p = -1.0 / (sign + nz)
-    q = nx * ny * p
-    sx, sy, sz = 1.0 + sign * nx * nx * p, sign * q, -sign * nx
-    tx, ty, tz = q, sign + ny * ny * p, -ny
-    best = _largest_cosine(ring, n, x, y, z, nx, ny, nz)
+    sx, sy, sz, tx, ty, tz = tangent_basis(nx / norm, ny / norm, nz / norm)
+    face = np.int64(birth[v]) // 3
+    best = _largest_cosine(ring, n, x, y, z, x, y, z)
     step = _FIRST_STEP
     moved = 0
     for _ in range(_ROUNDS):
         if best <= cosine or step < _LAST_STEP:
             break
-        bx, by, bz = x, y, z
+        bx, by, bz, better_face = x, y, z, face
         better = best
         for i in range(8):
             s = step * length * _DIRECTIONS[i, 0]
             t = step * length * _DIRECTIONS[i, 1]
             cx, cy, cz = x + s * sx + t * tx, y + s * sy + t * ty, z + s * sz + t * tz
-            trial = _largest_cosine(ring, n, cx, cy, cz, nx, ny, nz)
+            f = face
+            if on_surface:
+                f, s, t, _ = closest_face(tree, cx, cy, cz, face, stack)
+                cx, cy, cz = point_on_face(tree.corners, f, s, t)
+            trial = _largest_cosine(ring, n, cx, cy, cz, X[v, 0], X[v, 1], X[v, 2])
             if trial < better:
-                bx, by, bz, better = cx, cy, cz, trial
+                bx, by, bz, better_face, better = cx, cy, cz, f, trial
         if better < best:
-            x, y, z, best = bx, by, bz, better
+            x, y, z, face, best = bx, by, bz, better_face, better
             moved = 1
         else:
             step *= 0.5
-    X[v, 0], X[v, 1], X[v, 2] = x, y, z
+    if moved:
+        X[v, 0], X[v, 1], X[v, 2] = x, y, z
+        birth[v] = 3 * face
     return moved

@@ -1,0 +1,235 @@
+"""Slow, obvious twins of the kernels: faces as lists of tuples, plain loops, formulas as in the paper."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from itertools import combinations
+
+import numpy as np
+
+Face = tuple[int, int, int]
+
+
+def tuples(F) -> list[Face]:
+    return [tuple(int(v) for v in f) for f in np.asarray(F)]
+
+
+# --- connectivity --------------------------------------------------------------------------------
+
+
+def twins(F) -> list[int]:
+    """Opposite half-edge of every half-edge of an oriented manifold, -1 on the boundary."""
+    where = {}
+    for f, corners in enumerate(tuples(F)):
+        for c in range(3):
+            where[corners[c], corners[(c + 1) % 3]] = 3 * f + c
+    return [where.get((b, a), -1) for a, b in where]
+
+
+def neighbours(F) -> dict[int, set[int]]:
+    """Map every vertex to the vertices of its one-ring."""
+    ring = defaultdict(set)
+    for f in tuples(F):
+        for v in f:
+            ring[v].update(set(f) - {v})
+    return dict(ring)
+
+
+def boundary_edges(F) -> set[frozenset[int]]:
+    uses = defaultdict(int)
+    for f in tuples(F):
+        for pair in combinations(f, 2):
+            uses[frozenset(pair)] += 1
+    return {edge for edge, count in uses.items() if count == 1}
+
+
+def edges(F) -> set[frozenset[int]]:
+    return {frozenset(pair) for f in tuples(F) for pair in combinations(f, 2)}
+
+
+def ideal_valence(F) -> dict[int, int]:
+    rim = {v for edge in boundary_edges(F) for v in edge}
+    return {v: 4 if v in rim else 6 for v in neighbours(F)}
+
+
+def long_edges(V, F, limit: float) -> set[frozenset[int]]:
+    return {e for e in edges(F) if edge_length(V, e) > limit}
+
+
+def short_edges(V, F, limit: float) -> set[frozenset[int]]:
+    return {e for e in edges(F) if edge_length(V, e) < limit}
+
+
+def edge_length(V, edge) -> float:
+    a, b = edge
+    return float(np.linalg.norm(V[a] - V[b]))
+
+
+# --- topology of a collapse ----------------------------------------------------------------------
+
+
+def link_condition(F, a: int, b: int) -> bool:
+    """link(a) and link(b) meet in link(ab), all closed at the boundary by one vertex at infinity.
+
+    [Dey et al. 1999]: links as sets of vertices and edges.
+    """
+    infinity = -1
+    closed = tuples(F) + [(*edge, infinity) for edge in map(tuple, boundary_edges(F))]
+    common = link(closed, {a}) & link(closed, {b})
+    return common == link(closed, {a, b})
+
+
+def link(faces, simplex: set[int]) -> set[frozenset[int]]:
+    """Vertices and edges that complete a simplex to a face (or to an edge of one)."""
+    found = set()
+    for f in faces:
+        if simplex <= set(f):
+            rest = set(f) - simplex
+            found.update(frozenset(s) for k in (1, 2) for s in combinations(rest, k))
+    return found
+
+
+def collapse(F, a: int, b: int) -> list[Face]:
+    """Faces after b has become a, whatever comes of it."""
+    moved = [tuple(a if v == b else v for v in f) for f in tuples(F)]
+    return [f for f in moved if len(set(f)) == 3]
+
+
+def flip(F, a: int, b: int) -> list[Face]:
+    """Faces after edge a-b has become the other diagonal of its quad, whatever comes of it."""
+    quad = [f for f in tuples(F) if {a, b} <= set(f)]
+    first = next(f for f in quad if runs(f, a, b))
+    second = next(f for f in quad if runs(f, b, a))
+    c, d = (next(v for v in f if v not in (a, b)) for f in (first, second))
+    return [f for f in tuples(F) if f not in quad] + [(a, d, c), (b, c, d)]
+
+
+def runs(f: Face, a: int, b: int) -> bool:
+    """Whether a face runs from a straight to b."""
+    return (a, b) in ((f[0], f[1]), (f[1], f[2]), (f[2], f[0]))
+
+
+def split(V, F, a: int, b: int):
+    """Vertices and faces after edge a-b got a midpoint."""
+    new = len(V)
+    result = []
+    for f in tuples(F):
+        if {a, b} <= set(f):
+            result.append(tuple(new if v == b else v for v in f))
+            result.append(tuple(new if v == a else v for v in f))
+        else:
+            result.append(f)
+    return np.vstack([V, (V[a] + V[b]) / 2]), result
+
+
+def valence_gain(F, a: int, b: int) -> int:
+    """Fall of the summed distance from the ideal valences when a-b is flipped."""
+    ring, ideal = neighbours(F), ideal_valence(F)
+    quad = {v for f in tuples(F) if {a, b} <= set(f) for v in f}
+    before = sum(abs(len(ring[v]) - ideal[v]) for v in quad)
+    after = sum(abs(len(ring[v]) + (-1 if v in (a, b) else 1) - ideal[v]) for v in quad)
+    return before - after
+
+
+def violates_delaunay(V, F, a: int, b: int) -> bool:
+    """Whether the angles opposite a-b sum to more than pi."""
+    apexes = [(set(f) - {a, b}).pop() for f in tuples(F) if {a, b} <= set(f)]
+    return sum(angle(V[c], V[a], V[b]) for c in apexes) > np.pi + 1e-9
+
+
+# --- formulas ------------------------------------------------------------------------------------
+
+
+def angle(at, one, two) -> float:
+    """Angle at a point between the directions to two others."""
+    u, w = one - at, two - at
+    return float(np.arctan2(np.linalg.norm(np.cross(u, w)), u @ w))
+
+
+def normal(V, f: Face) -> np.ndarray:
+    """Twice the area times the unit normal."""
+    a, b, c = (V[v] for v in f)
+    return np.cross(b - a, c - a)
+
+
+def voronoi_areas(V, F) -> np.ndarray:
+    """Mixed Voronoi area of every vertex [Meyer et al. 2003, figure 4]."""
+    areas = np.zeros(len(V))
+    for f in tuples(F):
+        angles = [angle(V[f[c]], V[f[c - 2]], V[f[c - 1]]) for c in range(3)]
+        whole = np.linalg.norm(normal(V, f)) / 2
+        for c in range(3):
+            a, b, d = f[c], f[c - 2], f[c - 1]
+            if max(angles) > np.pi / 2:
+                areas[a] += whole / (2 if angles[c] > np.pi / 2 else 4)
+            else:
+                areas[a] += (
+                    ((V[a] - V[b]) @ (V[a] - V[b])) / np.tan(angles[c - 1])
+                    + ((V[a] - V[d]) @ (V[a] - V[d])) / np.tan(angles[c - 2])
+                ) / 8
+    return areas
+
+
+def relaxed(V, F, *, angle_weights=False, stiffness=0.0, slide=False) -> np.ndarray:
+    """Every vertex moved at once: ``p += (I - n n^T)(g - p)``, boundary vertices along the boundary."""
+    ring, areas = neighbours(F), voronoi_areas(V, F)
+    rim = boundary_edges(F)
+    result = V.copy()
+    for v, around in ring.items():
+        beside = [w for w in around if frozenset((v, w)) in rim]
+        if beside:
+            if slide:
+                result[v] += along_chord(V[v], *(V[w] for w in beside))
+            continue
+        g = sum(areas[w] * V[w] for w in around) / sum(areas[w] for w in around)
+        result[v] += tangential(V, F, v, g - V[v], angle_weights, stiffness)
+    return result
+
+
+def along_chord(p, before, after) -> np.ndarray:
+    """Step of a boundary vertex towards the middle of its neighbours, along the line between them."""
+    chord = (after - before) / np.linalg.norm(after - before)
+    return ((before + after) / 2 - p) @ chord * chord
+
+
+def tangential(V, F, v: int, step, angle_weights: bool, stiffness: float) -> np.ndarray:
+    around = [f for f in tuples(F) if v in f]
+    vectors = [normal(V, f) for f in around]
+    norms = [np.linalg.norm(n) for n in vectors]
+    weights = norms
+    if angle_weights:
+        weights = [angle(V[v], *(V[w] for w in f if w != v)) for f in around]
+    n = sum(w * u / s for w, u, s in zip(weights, vectors, norms, strict=True))
+    if np.linalg.norm(n) <= sum(weights) / 2:  # a sharp vertex has no tangent plane
+        return np.zeros(3)
+    n = n / np.linalg.norm(n)
+    flat = np.eye(3) - np.outer(n, n)
+    step = flat @ step
+    tensor = sum(np.outer(u, u) / s for u, s in zip(vectors, norms, strict=True)) / sum(norms)
+    tensor = flat @ tensor @ flat
+    if np.trace(tensor) < 1e-3:  # flat to two degrees
+        return step
+    return np.linalg.solve(np.eye(3) + stiffness * tensor @ tensor, step)
+
+
+def closest_on_triangle(p, a, b, c) -> tuple[np.ndarray, float]:
+    """Closest point and its distance: the foot in the plane if inside, else the best on the edges."""
+    u, w = b - a, c - a
+    if np.linalg.norm(np.cross(u, w)) > 0:
+        (s, t), *_ = np.linalg.lstsq(np.stack([u, w], axis=1), p - a, rcond=None)
+        if s >= 0 and t >= 0 and s + t <= 1:
+            foot = a + s * u + t * w
+            return foot, float(np.linalg.norm(p - foot))
+    feet = [closest_on_segment(p, *ends) for ends in ((a, b), (b, c), (c, a))]
+    foot = min(feet, key=lambda q: np.linalg.norm(p - q))
+    return foot, float(np.linalg.norm(p - foot))
+
+
+def closest_on_segment(p, a, b) -> np.ndarray:
+    squared = (b - a) @ (b - a)
+    s = min(max((p - a) @ (b - a) / squared, 0.0), 1.0) if squared > 0 else 0.0
+    return a + s * (b - a)
+
+
+def distance_to_mesh(p, V, F) -> float:
+    return min(closest_on_triangle(p, *V[list(f)])[1] for f in tuples(F))
