@@ -1,11 +1,12 @@
 """The only place with Numba flags: three decorators, and how many threads a call may use.
 
-* ``inlined``: scalar helper, called from kernels only.
-* ``kernel``: serial kernel, called from Python or from drivers.
-* ``driver``: a loop over blocks written once with ``prange``; compiled as a serial and, when first
-  needed, as a parallel kernel. Both give the same bits, because blocks never conflict. A driver
-  that only writes to fields of a record needs these arrays as arguments of their own: Numba's
-  parallel build (0.68) takes such writes for dead code and drops the loop.
+* ``inlined``: helper, called from kernels only.
+* ``kernel``: serial kernel, called from Python.
+* ``driver``: a loop over blocks written once with ``prange``, called from Python as
+  ``name(parallel, ...)``; compiled as a serial and, when first needed, as a parallel kernel. Both
+  give the same bits, because blocks never conflict. A driver that only writes to fields of a record
+  needs these arrays as arguments of their own: Numba's parallel build (0.68) takes such writes for
+  dead code and drops the loop.
 
 No ``fastmath``: results decide topology and must not depend on how a loop was vectorised.
 ``error_model="numpy"`` lets a division by zero give inf or NaN; kernels never raise.
@@ -19,6 +20,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -27,77 +29,88 @@ from numba.core import event
 
 __all__ = ["available_threads", "compile_notice", "driver", "inlined", "kernel", "thread_scope"]
 
-_FLAGS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-_INLINED = {**_FLAGS, "forceinline": True}
+_FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+
+# Without `_nrt` a helper counts no references. Passing records of arrays to helpers that do costs
+# a quarter of the time of a call, in atomic instructions that two threads fight for; in return such
+# a helper cannot allocate. Not cached: helpers live in the caches of the kernels that use them.
+_INLINED: dict[str, Any] = {**_FLAGS, "forceinline": True, "_nrt": False}
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Compile a helper that LLVM always inlines into the kernels that call it.
-
-    A call that stays a call counts references on every array of the records passed: it made a
-    split 5 times slower.
-    """
-    return numba.njit(**_INLINED)(_keyed(function, ""))
+    """Compile a helper that LLVM always inlines into the kernels that call it."""
+    return numba.njit(**_INLINED)(function)
 
 
-def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a serial kernel."""
-    return numba.njit(**_FLAGS)(_keyed(function, ""))
-
-
-class driver:  # lower case: a decorator, used like the two functions above
-    """Compile a ``prange`` loop over blocks twice: serial, and parallel when first needed."""
+class kernel:  # lower case: a decorator, used like a function
+    """Compile a serial kernel when it is first called."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
+        self.py_func: Any = function
         self.__doc__ = function.__doc__
         self.__name__ = function.__name__
-        self._serial = numba.njit(**_FLAGS)(_keyed(function, "_serial"))
-        self._parallel: Any = None
+
+    @cached_property
+    def serial(self) -> Any:
+        """The serial build."""
+        return numba.njit(cache=True, **_FLAGS)(_keyed(self.py_func, "serial"))
+
+    def __call__(self, *args: Any) -> Any:
+        """Run."""
+        return self.serial(*args)
+
+
+class driver(kernel):
+    """Compile a ``prange`` loop over blocks twice: serial, and parallel when first needed."""
+
+    @cached_property
+    def parallel(self) -> Any:
+        """The parallel build."""
+        return numba.njit(cache=True, parallel=True, **_FLAGS)(_keyed(self.py_func, "parallel"))
 
     def __call__(self, parallel: bool, *args: Any) -> Any:
-        """Run on one thread or on all threads of the current scope."""
-        if not parallel:
-            return self._serial(*args)
-        if self._parallel is None:
-            twin = _keyed(self._function, "_parallel")
-            self._parallel = numba.njit(parallel=True, **_FLAGS)(twin)
-        return self._parallel(*args)
+        """Run on one thread, or on all threads of the current scope."""
+        return self.parallel(*args) if parallel else self.serial(*args)
 
 
 def _keyed(function: Any, suffix: str) -> FunctionType:
     """Copy a function under a name that holds a digest of its code and of all that it calls.
 
-    Numba's disk cache does not see edits in imported modules, nor does it tell the serial build of
-    a function from the parallel one. Both are part of the name here, and the name is in the key.
+    Numba's disk cache does not see edits in imported modules or in helpers, nor does it tell the
+    serial build of a function from the parallel one. Both are part of the name here, and the name
+    is part of the key. To be called late: helpers may be defined below the kernel.
     """
-    digest = hashlib.sha256(repr(sorted(_INLINED.items())).encode())
-    _feed(digest, function.__code__, function.__globals__)
+    digest = hashlib.sha256(repr((sorted(_FLAGS.items()), sorted(_INLINED.items()))).encode())
+    _feed(digest, function.__code__, function.__globals__, set())
     copy = FunctionType(
         function.__code__,
         function.__globals__,
-        function.__name__ + suffix,
+        f"{function.__name__}_{suffix}",
         function.__defaults__,
         function.__closure__,
     )
-    copy.__qualname__ = f"{function.__qualname__}{suffix}_{digest.hexdigest()[:10]}"
+    copy.__qualname__ = f"{function.__qualname__}_{suffix}_{digest.hexdigest()[:12]}"
     copy.__doc__ = function.__doc__
     copy.__module__ = function.__module__
     return copy
 
 
-def _feed(digest: Any, code: CodeType, scope: dict[str, Any]) -> None:
+def _feed(digest: Any, code: CodeType, scope: dict[str, Any], seen: set[CodeType]) -> None:
+    """Add code, constants, and the globals it uses, helpers and all that they use among them."""
+    if code in seen:
+        return
+    seen.add(code)
     digest.update(code.co_code)
     digest.update(repr(code.co_names).encode())
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
-            _feed(digest, constant, scope)
+            _feed(digest, constant, scope, seen)
         else:
             digest.update(repr(constant).encode())
     for name in code.co_names:
         value: Any = scope.get(name)
         if hasattr(value, "py_func"):
-            digest.update(value.py_func.__qualname__.encode())
+            _feed(digest, value.py_func.__code__, value.py_func.__globals__, seen)
         elif isinstance(value, int | float | bool | str | tuple):
             digest.update(repr(value).encode())
         elif hasattr(value, "tobytes"):

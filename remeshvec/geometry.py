@@ -115,7 +115,10 @@ def angle_from_cosine(cosine):
 
 @inlined
 def corner_angles(X, a, b, c):
-    """Angles of a triangle to 1e-4 rad, the third as what is missing to pi; 0 where an edge has no length."""
+    """Angles of a triangle to 1e-4 rad, the third as what is missing to pi.
+
+    All are 0 where an edge has no length.
+    """
     ux, uy, uz = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
     vx, vy, vz = X[c, 0] - X[a, 0], X[c, 1] - X[a, 1], X[c, 2] - X[a, 2]
     uu = ux * ux + uy * uy + uz * uz

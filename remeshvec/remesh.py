@@ -13,6 +13,7 @@ from ._check import as_mesh, positive_count
 from ._jit import compile_notice, thread_scope
 from ._types import APEX, INNER, Blocks, FloatArray, Mesh
 from .edge_sets import make_blocks
+from .errors import OptionError
 from .operations.collapse import CollapseLimits, collapse_short_edges
 from .operations.fit import fit_vertices
 from .operations.flip import FlipLimits, flip_edges
@@ -20,7 +21,6 @@ from .operations.project import Reference, locate_vertices, project_boundary, pr
 from .operations.relax import RelaxOptions, relax_vertices
 from .operations.split import MAX_ROUNDS, compact, split_long_edges
 from .operations.untangle import untangle_vertices
-from .errors import OptionError
 from .options import Options, make_options
 from .prepare import Prepared, build_reference, choose_length, prepare
 from .report import RemeshResult, Report, Stopwatch

@@ -6,6 +6,7 @@ from collections import defaultdict
 from itertools import combinations
 
 import numpy as np
+from remeshvec.geometry import SHARP
 
 Face = tuple[int, int, int]
 
@@ -200,7 +201,7 @@ def tangential(V, F, v: int, step, angle_weights: bool, stiffness: float) -> np.
     if angle_weights:
         weights = [angle(V[v], *(V[w] for w in f if w != v)) for f in around]
     n = sum(w * u / s for w, u, s in zip(weights, vectors, norms, strict=True))
-    if np.linalg.norm(n) <= sum(weights) / 2:  # a sharp vertex has no tangent plane
+    if np.linalg.norm(n) <= SHARP * sum(weights):  # no tangent plane: it stays
         return np.zeros(3)
     n = n / np.linalg.norm(n)
     flat = np.eye(3) - np.outer(n, n)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import topology
-from remeshvec._types import BOUNDARY, DEAD, FIXED, INNER, NONE, Blocks, Mesh
+from remeshvec._types import APEX, BOUNDARY, DEAD, FIXED, INNER, NONE, Blocks, Mesh
 from remeshvec.edge_sets import make_blocks
 from remeshvec.halfedge import build_mesh
 from remeshvec.order import order_mesh
@@ -112,7 +112,8 @@ def assert_valid(mesh: Mesh, slits: bool = False) -> None:
         assert walk(origin, twin, start) == sorted(leaving), f"vertex {v} is no single fan"
         valence = len(leaving) + len(open_ones)
         assert mesh.valence_excess[v] == valence - (4 if open_ones else 6), f"valence of {v}"
-        assert mesh.kind[v] in ((BOUNDARY, FIXED) if open_ones else (INNER, FIXED)), f"kind of {v}"
+        kinds = (BOUNDARY, FIXED) if open_ones else (INNER, APEX, FIXED)
+        assert mesh.kind[v] in kinds, f"kind of {v}"
 
 
 def next_of(h: int) -> int:

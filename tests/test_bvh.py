@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import zoo
 from remeshvec._jit import kernel
-from remeshvec.bvh import build_tree, closest_face
+from remeshvec.bvh import STACK, build_tree, closest_face
 from remeshvec.order import order_mesh
 
 RNG = np.random.default_rng(11)
@@ -14,10 +14,9 @@ RNG = np.random.default_rng(11)
 
 @kernel
 def query(tree, P, hints, faces, weights, squared):
-    node = np.empty(64, np.int64)
-    depth = np.empty(64, np.int64)
+    stack = np.empty((2, STACK), np.int64)
     for i in range(len(P)):
-        f, s, t, d = closest_face(tree, P[i, 0], P[i, 1], P[i, 2], hints[i], node, depth)
+        f, s, t, d = closest_face(tree, P[i, 0], P[i, 1], P[i, 2], hints[i], stack)
         faces[i], weights[i, 0], weights[i, 1], squared[i] = f, s, t, d
 
 

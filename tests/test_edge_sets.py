@@ -6,6 +6,7 @@ import pytest
 import zoo
 from remeshvec import edge_sets
 from remeshvec._types import Blocks
+from remeshvec.bvh import build_tree
 from remeshvec.edge_sets import OWNED, REST, SHIFTED, list_range, stage_blocks, vertex_range
 from remeshvec.operations import collapse, flip, untangle
 from structure import assert_same_bits, blocks_of, built, copied, half_edge
@@ -98,8 +99,15 @@ def quad():
     return V, np.array(F)
 
 
+def wanted(V, F, quad_vertices):
+    """Mesh whose valences say that the quad's edge should flip."""
+    mesh = built(V, F)
+    mesh.valence_excess[list(quad_vertices)] = [1, 1, -1, -1]
+    return mesh
+
+
 def test_the_flip_itself_is_wanted():
-    mesh = built(*quad())
+    mesh = wanted(*quad(), range(4))
     blocks = Blocks(np.array([0, 6, 6]), np.array([0, 6, 6]))
     assert run_owned(flip._flip, mesh, blocks, FLIPS, half_edge(mesh, 0, 1), flip.N_OUTCOMES)
     half_edge(mesh, 2, 3)
@@ -109,7 +117,7 @@ def test_the_flip_itself_is_wanted():
 def test_a_flip_owns_the_four_vertices_of_its_quad(outside):
     """Both faces lie in the block, so a rule that owns faces only would let each of these run."""
     V, F, new = with_last(*quad(), outside)
-    mesh = built(V, F)
+    mesh = wanted(V, F, new[:4])
     before = copied(mesh)
     h = half_edge(mesh, new[0], new[1])
     for side in (h, int(mesh.twin[h])):
@@ -121,7 +129,7 @@ def test_a_flip_owns_the_four_vertices_of_its_quad(outside):
 @pytest.mark.parametrize("outside", [4, 5])
 def test_a_flip_owns_no_more_than_its_quad(outside):
     V, F, new = with_last(*quad(), outside)
-    mesh = built(V, F)
+    mesh = wanted(V, F, new[:4])
     h = half_edge(mesh, new[0], new[1])
     assert run_owned(flip._flip, mesh, all_but_the_last_vertex(mesh), FLIPS, h, flip.N_OUTCOMES)
     half_edge(mesh, new[2], new[3])
@@ -178,9 +186,10 @@ def test_a_move_owns_the_closed_ring_of_its_vertex():
         W, G, new = with_last(V, F, v)
         mesh = built(W, G)
         candidates = np.full(len(W), new[centre], np.int32)
-        moved = np.zeros(2, np.int64)
+        moved, count = np.zeros(2, np.int64), np.array([1, 0])
+        tree = build_tree(mesh.X, G.astype(np.int32), False)
         blocks = all_but_the_last_vertex(mesh)
         untangle._untangle(
-            False, mesh, blocks, OWNED, np.cos(0.8), candidates, np.array([1, 0]), moved
+            False, mesh, blocks, OWNED, tree, False, np.cos(0.8), candidates, count, moved
         )
         assert candidates[0] == new[centre] and not moved.any()

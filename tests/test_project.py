@@ -1,0 +1,112 @@
+"""Projection and births: vertices end on the input, boundaries on their own loop."""
+
+import igl
+import numpy as np
+import pytest
+import zoo
+from remeshvec._types import APEX, BOUNDARY, FIXED, INNER
+from remeshvec.operations.project import locate_vertices, project_boundary, project_vertices
+from remeshvec.prepare import build_reference
+from structure import assert_valid, built, copied, one_block
+
+MESHES = ["icosphere", "torus", "genus_2", "planar_delaunay", "annulus", "grid", "two_components"]
+
+
+def moved(name, amount, seed=0):
+    """Mesh, its reference, and vertices at random places near it."""
+    V, F = zoo.ZOO[name].make()
+    mesh = built(V, F, ordered=True)
+    reference = build_reference(mesh, zoo.mean_edge(V, F), False)
+    mesh.kind[mesh.kind == APEX] = INNER
+    noise = np.random.default_rng(seed).normal(size=(len(mesh.X), 3))
+    free = mesh.kind != FIXED
+    mesh.X[free, :3] += amount * zoo.mean_edge(V, F) * noise[free]
+    return mesh, reference
+
+
+def distance(reference, P):
+    F = reference.origin.reshape(-1, 3).astype(np.int64)
+    squared, _, points = igl.point_mesh_squared_distance(P, reference.X[:, :3].copy(), F)
+    return np.sqrt(squared), points
+
+
+def places(reference, faces, barycentric):
+    F = reference.origin.reshape(-1, 3)
+    return np.einsum("nc,ncx->nx", barycentric, reference.X[F[faces], :3])
+
+
+@pytest.mark.parametrize("amount", [1e-3, 0.3, 3.0])
+@pytest.mark.parametrize("name", MESHES)
+def test_inner_vertices_go_to_the_closest_point(name, amount):
+    mesh, reference = moved(name, amount)
+    before = mesh.X[:, :3].copy()
+    project_vertices(mesh, one_block(mesh), reference, False)
+    inner = mesh.kind == INNER
+    found, _ = distance(reference, mesh.X[inner, :3].copy())
+    assert found.max(initial=0) < 1e-12 * np.abs(reference.X).max()
+    shortest, _ = distance(reference, before[inner])
+    step = np.linalg.norm(mesh.X[inner, :3] - before[inner], axis=1)
+    assert step == pytest.approx(shortest, rel=1e-9, abs=1e-13)
+    assert_valid(mesh)
+
+
+@pytest.mark.parametrize("name", ["sliver_fan", "annulus", "grid", "cylinder"])
+def test_boundary_vertices_stay_on_the_boundary(name):
+    mesh, reference = moved(name, 0.3)
+    project_vertices(mesh, one_block(mesh), reference, False)
+    rim = mesh.kind == BOUNDARY
+    assert rim.any()
+    F = reference.origin.reshape(-1, 3)
+    segments = reference.X[igl.boundary_facets(F.astype(np.int64))[0], :3]
+    for p in mesh.X[rim, :3]:
+        assert min(to_segment(p, *ends) for ends in segments) < 1e-13
+
+
+def to_segment(p, a, b):
+    s = np.clip((p - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+    return np.linalg.norm(p - a - s * (b - a))
+
+
+def test_fixed_vertices_stay():
+    mesh, reference = moved("grid", 0.2)
+    mesh.kind[:] = FIXED
+    before = copied(mesh)
+    project_vertices(mesh, one_block(mesh), reference, False)
+    assert np.array_equal(mesh.X, before.X)
+
+
+def test_project_boundary_leaves_the_inside_alone():
+    mesh, reference = moved("grid", 0.2)
+    before = mesh.X.copy()
+    project_boundary(mesh, one_block(mesh), reference, False)
+    inner = mesh.kind == INNER
+    assert np.array_equal(mesh.X[inner], before[inner])
+    rim = mesh.kind == BOUNDARY
+    assert not (mesh.X[rim] == before[rim]).all(axis=1).any()
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_births_reproduce_projected_vertices(name):
+    mesh, reference = moved(name, 0.3)
+    project_vertices(mesh, one_block(mesh), reference, False)
+    before = mesh.X.copy()
+    weights = locate_vertices(mesh, one_block(mesh), reference, False)
+    assert np.array_equal(mesh.X, before)
+    assert weights.min() >= -1e-15 and weights.sum(axis=1) == pytest.approx(1)
+    assert places(reference, mesh.birth // 3, weights) == pytest.approx(before[:, :3], abs=1e-12)
+
+
+def test_births_of_others_are_the_closest_points():
+    mesh, reference = moved("torus", 0.5)
+    weights = locate_vertices(mesh, one_block(mesh), reference, False)
+    shortest, _ = distance(reference, mesh.X[:, :3].copy())
+    found = np.linalg.norm(places(reference, mesh.birth // 3, weights) - mesh.X[:, :3], axis=1)
+    assert found == pytest.approx(shortest, rel=1e-9)
+
+
+def test_a_second_projection_changes_nothing_but_rounding():
+    mesh, reference = moved("genus_3", 0.4)
+    project_vertices(mesh, one_block(mesh), reference, False)
+    before = mesh.X.copy()
+    project_vertices(mesh, one_block(mesh), reference, False)
+    assert mesh.X == pytest.approx(before, abs=1e-14)
