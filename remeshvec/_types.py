@@ -84,6 +84,8 @@ class Tree(NamedTuple):
     ----------
     corners : (m, 9) float64
         Corner coordinates of every face, in Morton order.
+    twin : (3 m,) int32
+        Opposite half-edges, for walks from face to face.
     boxes : (k, 6) float64
         Lower and upper corners of the boxes, leaves first.
     level : (l + 1,) int64
@@ -91,5 +93,6 @@ class Tree(NamedTuple):
     """
 
     corners: FloatArray
+    twin: IndexArray
     boxes: FloatArray
     level: NDArray[np.int64]

@@ -162,29 +162,20 @@ def closest_on_segment(px, py, pz, ax, ay, az, bx, by, bz):
 def closest_on_triangle(px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz):
     """Barycentric weights of b and c of the closest point, and the squared distance.
 
-    By regions as in Ericson [2005, section 5.1.5]; a triangle without area falls back on its edges.
+    Where p does not lie over the triangle, the closest of its three edges decides; so it does for a
+    triangle without area. Weights come from vector products: the usual scalar products lose all
+    digits on needles.
     """
-    ux = bx - ax
-    uy = by - ay
-    uz = bz - az
-    wx = cx - ax
-    wy = cy - ay
-    wz = cz - az
-    qx = px - ax
-    qy = py - ay
-    qz = pz - az
-    uu = ux * ux + uy * uy + uz * uz
-    uw = ux * wx + uy * wy + uz * wz
-    ww = wx * wx + wy * wy + wz * wz
-    qu = qx * ux + qy * uy + qz * uz
-    qw = qx * wx + qy * wy + qz * wz
-    determinant = uu * ww - uw * uw
-    s = ww * qu - uw * qw
-    t = uu * qw - uw * qu
-    # 1e-14: below this share the two edge vectors are parallel to working precision.
-    if s >= 0.0 and t >= 0.0 and s + t <= determinant and determinant > 1e-14 * uu * ww:
-        s /= determinant
-        t /= determinant
+    ux, uy, uz = bx - ax, by - ay, bz - az
+    wx, wy, wz = cx - ax, cy - ay, cz - az
+    qx, qy, qz = px - ax, py - ay, pz - az
+    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+    nn = nx * nx + ny * ny + nz * nz
+    s = (qy * wz - qz * wy) * nx + (qz * wx - qx * wz) * ny + (qx * wy - qy * wx) * nz
+    t = (uy * qz - uz * qy) * nx + (uz * qx - ux * qz) * ny + (ux * qy - uy * qx) * nz
+    if s >= 0.0 and t >= 0.0 and s + t <= nn and nn > 0.0:
+        s /= nn
+        t /= nn
         x = qx - s * ux - t * wx
         y = qy - s * uy - t * wy
         z = qz - s * uz - t * wz

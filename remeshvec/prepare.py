@@ -50,6 +50,8 @@ def prepare(V: FloatArray, F: NDArray[np.int64], parallel: bool) -> Prepared:
     used[F.ravel()] = True
     _note(dirt, "unreferenced_vertices", len(V) - int(used.sum()))
     V, centre, scale = _to_frame(V, V if used.all() else V[used])
+    if not used.all():
+        V[~used] = V[used][0]  # they may lie anywhere and would spoil the order of the others
     F32 = F.astype(np.int32)
     source = np.arange(len(F))
     F32, source = _filter(F32, source, drop_degenerate_faces(F32), dirt, "degenerate_faces")
@@ -114,7 +116,7 @@ def build_reference(mesh: Mesh, length: float, parallel: bool) -> Reference:
     tips = apexes(mesh, length)
     mesh.kind[boundary_corners(mesh, links, length)] = FIXED
     mesh.kind[tips] = APEX
-    tree = build_tree(X, origin.reshape(-1, 3), parallel)
+    tree = build_tree(X, origin.reshape(-1, 3), mesh.twin.copy(), parallel)
     return Reference(tree, X, origin, links)
 
 

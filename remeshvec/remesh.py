@@ -30,7 +30,11 @@ __all__ = ["remesh"]
 Callback = Callable[[int, str, int], Any]
 
 # Below this a parallel region costs more than it saves when another process holds a core.
-_PARALLEL_FACES = 20_000
+_PARALLEL_FACES = 50_000
+
+# Between sweeps, vertices that a walk brings this close to the input, as a share of L, are not checked
+# against the whole of it.
+_TRUST = 0.05
 
 MAX_FACES = 50_000_000
 
@@ -229,7 +233,7 @@ class _Run:
                 relax_vertices(mesh, blocks, relax, parallel)
         with self.watch.time("project"):
             if options.project and left <= options.projected_sweeps:
-                project_vertices(mesh, blocks, reference, parallel)
+                project_vertices(mesh, blocks, reference, _TRUST * length, parallel)
             elif options.project:
                 project_boundary(mesh, blocks, reference, parallel)
         self._is_cancelled(sweep, "relax")
@@ -259,15 +263,16 @@ class _Run:
             blocks = make_blocks(mesh)
             mesh.kind[mesh.kind == APEX] = INNER
         with self.watch.time("finish"):
-            if options.project:  # the sweeps may have been cancelled, and tips were held
-                project_vertices(mesh, blocks, reference, parallel)
+            if options.project:
+                project_vertices(mesh, blocks, reference, 0.0, parallel)
             cosine = cos(radians(options.untangle_angle))
             for _ in range(options.untangle_rounds):
                 untangle_vertices(mesh, blocks, reference.tree, options.project, cosine, parallel)
             for _ in range(options.fit_rounds):
                 fit_vertices(mesh, blocks, reference.tree, 0.2 * length, parallel)
         with self.watch.time("locate"):
-            barycentric = locate_vertices(mesh, blocks, reference, parallel)
+            trust = np.inf if options.project and not options.fit_rounds else 0.0
+            barycentric = locate_vertices(mesh, blocks, reference, trust, parallel)
         return mesh, barycentric
 
     def _is_cancelled(self, sweep: int, phase: str) -> bool:

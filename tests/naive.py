@@ -57,6 +57,17 @@ def long_edges(V, F, limit: float) -> set[frozenset[int]]:
     return {e for e in edges(F) if edge_length(V, e) > limit}
 
 
+def asked_splits(V, F, limit: float) -> set[frozenset[int]]:
+    """Edges that one round splits: the long ones of every face, of a low face the longest one only."""
+    result = set()
+    for f in tuples(F):
+        sides = sorted((frozenset(p) for p in combinations(f, 2)), key=lambda e: edge_length(V, e))
+        long = [e for e in sides if edge_length(V, e) > limit]
+        height = np.linalg.norm(normal(V, f)) / edge_length(V, sides[-1])
+        result.update(long if height >= limit / 2 else long[-1:])
+    return result
+
+
 def short_edges(V, F, limit: float) -> set[frozenset[int]]:
     return {e for e in edges(F) if edge_length(V, e) < limit}
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import topology
-from remeshvec._types import APEX, BOUNDARY, DEAD, FIXED, INNER, NONE, Blocks, Mesh
+from remeshvec._types import APEX, BOUNDARY, DEAD, FIXED, INNER, NONE, Blocks, Mesh, Tree
+from remeshvec.bvh import build_tree
 from remeshvec.edge_sets import make_blocks
 from remeshvec.halfedge import build_mesh
+from remeshvec.operations.project import locate_vertices, project_vertices
 from remeshvec.order import order_mesh
 
 
@@ -20,6 +22,19 @@ def built(V, F, ordered: bool = False) -> Mesh:
     mesh, _ = build_mesh(X, F)
     mesh.birth[:] = mesh.vertex_halfedge
     return mesh
+
+
+def tree_of(mesh: Mesh, parallel: bool = False) -> Tree:
+    return build_tree(mesh.X, mesh.origin.reshape(-1, 3), mesh.twin, parallel)
+
+
+def project(mesh: Mesh, reference, blocks: Blocks | None = None, parallel: bool = False) -> None:
+    """Project, looking at the whole surface."""
+    project_vertices(mesh, blocks or one_block(mesh), reference, 0.0, parallel)
+
+
+def locate(mesh: Mesh, reference, blocks: Blocks | None = None, parallel: bool = False):
+    return locate_vertices(mesh, blocks or one_block(mesh), reference, 0.0, parallel)
 
 
 def one_block(mesh: Mesh) -> Blocks:

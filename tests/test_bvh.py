@@ -6,100 +6,124 @@ import numpy as np
 import pytest
 import zoo
 from remeshvec._jit import kernel
-from remeshvec.bvh import STACK, build_tree, closest_face
-from remeshvec.order import order_mesh
+from remeshvec.bvh import STACK, closest_face
+from structure import built, faces_of, tree_of
 
 RNG = np.random.default_rng(11)
 
 
 @kernel
-def query(tree, P, hints, faces, weights, squared):
+def query(tree, P, hints, trust, faces, weights, squared):
     stack = np.empty((2, STACK), np.int64)
     for i in range(len(P)):
-        f, s, t, d = closest_face(tree, P[i, 0], P[i, 1], P[i, 2], hints[i], stack)
+        f, s, t, d = closest_face(tree, P[i, 0], P[i, 1], P[i, 2], hints[i], trust, stack)
         faces[i], weights[i, 0], weights[i, 1], squared[i] = f, s, t, d
 
 
-def closest(V, F, P, hints=None):
-    """Faces, points and distances, through the tree over the mesh as ordered here."""
-    tree = build_tree(V, F, False)
+def closest(mesh, P, hints=None, trust=0.0):
+    """Faces, points and distances."""
+    F = mesh.origin.reshape(-1, 3)
     faces, weights, squared = np.empty(len(P), int), np.empty((len(P), 2)), np.empty(len(P))
     if hints is None:
         hints = RNG.integers(len(F), size=len(P))
-    query(tree, P, np.asarray(hints, np.int64), faces, weights, squared)
-    a, b, c = np.moveaxis(V[F[faces], :3], 1, 0)
+    query(tree_of(mesh), P, np.asarray(hints, np.int64), trust, faces, weights, squared)
+    assert weights.min() >= -1e-12 and weights.sum(axis=1).max() <= 1 + 1e-12
+    a, b, c = np.moveaxis(mesh.X[F[faces], :3], 1, 0)
     s, t = weights[:, :1], weights[:, 1:]
     return faces, a + s * (b - a) + t * (c - a), np.sqrt(squared)
 
 
-def in_order(V, F):
-    ordered = order_mesh(np.asarray(V, float), np.asarray(F, np.int32), False)
-    return ordered.X, ordered.F
+def truth(mesh, P):
+    """Distances and points by libigl."""
+    V, F = mesh.X[:, :3].copy(), faces_of(mesh).astype(np.int64)
+    squared, _, points = igl.point_mesh_squared_distance(P, V, F)
+    return np.sqrt(squared), points
 
 
-@pytest.mark.parametrize("name", ["triangle", "square", "tetrahedron", "torus", "genus_3", "thin_sheet", "bipyramid"])
+NAMES = ["triangle", "square", "tetrahedron", "torus", "genus_3", "thin_sheet", "bipyramid", "bowtie"]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_distance_agrees_with_libigl(name):
-    X, F = in_order(*zoo.ZOO[name].make())
-    size = np.ptp(X[:, :3], axis=0).max()
-    P = X[:, :3].mean(axis=0) + size * RNG.normal(size=(400, 3))
-    _, points, distance = closest(X, F, P)
-    squared, _, expected = igl.point_mesh_squared_distance(P, X[:, :3].copy(), F.astype(np.int64))
-    assert distance == pytest.approx(np.sqrt(squared), rel=1e-9)
+    mesh = built(*zoo.ZOO[name].make(), ordered=True)
+    size = np.ptp(mesh.X[:, :3], axis=0).max()
+    P = mesh.X[:, :3].mean(axis=0) + size * RNG.normal(size=(400, 3))
+    _, points, distance = closest(mesh, P)
+    expected, places = truth(mesh, P)
+    assert distance == pytest.approx(expected, rel=1e-9)
     assert np.linalg.norm(P - points, axis=1) == pytest.approx(distance, rel=1e-9)
-    near = np.linalg.norm(points - expected, axis=1) < 1e-7 * size
+    near = np.linalg.norm(points - places, axis=1) < 1e-7 * size
     assert near.mean() > 0.9  # the others are as near to two places
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_on_the_surface_and_near_it(seed):
-    X, F = in_order(*zoo.perturb(*zoo.icosphere(3), amount=0.1, seed=seed))
+    mesh = built(*zoo.perturb(*zoo.icosphere(3), amount=0.1, seed=seed), ordered=True)
+    F = faces_of(mesh)
     corners = RNG.dirichlet((1, 1, 1), size=len(F))
-    P = np.einsum("fc,fcx->fx", corners, X[F, :3])
-    _, points, distance = closest(X, F, P)
-    assert distance.max() < 1e-14
+    P = np.einsum("fc,fcx->fx", corners, mesh.X[F, :3])
+    assert closest(mesh, P)[2].max() < 1e-13
     P += 1e-3 * RNG.normal(size=P.shape)
-    _, _, distance = closest(X, F, P)
-    squared, _, _ = igl.point_mesh_squared_distance(P, X[:, :3].copy(), F.astype(np.int64))
-    assert distance == pytest.approx(np.sqrt(squared), rel=1e-7, abs=1e-14)
+    assert closest(mesh, P)[2] == pytest.approx(truth(mesh, P)[0], rel=1e-7, abs=1e-13)
 
 
 def test_faces_without_area():
+    """One face squeezed to a line, one to a point; the rest by looking at every face."""
     V, F = zoo.torus(9, 6)
-    flat = np.array([[0, 1, 1], [2, 2, 2], [5, 9, 14]])
-    V[14] = (V[5] + V[9]) / 2
-    X, F = in_order(V, np.vstack([F, flat]))
+    V[F[0, 2]] = (V[F[0, 0]] + V[F[0, 1]]) / 2
+    V[F[50, 1]] = V[F[50, 2]] = V[F[50, 0]]
+    mesh = built(V, F, ordered=True)
     P = RNG.normal(size=(100, 3))
-    _, _, distance = closest(X, F, P)
-    assert distance == pytest.approx([naive.distance_to_mesh(p, X[:, :3], F) for p in P])
+    expected = [naive.distance_to_mesh(p, mesh.X[:, :3], faces_of(mesh)) for p in P]
+    assert closest(mesh, P)[2] == pytest.approx(expected)
 
 
 def test_the_distance_does_not_depend_on_the_hint():
-    X, F = in_order(*zoo.genus_2())
+    mesh = built(*zoo.genus_2(), ordered=True)
     P = RNG.normal(scale=2, size=(50, 3))
-    distances = [closest(X, F, P, np.full(len(P), hint))[2] for hint in range(0, len(F), 7)]
-    assert all(np.array_equal(distances[0], d) for d in distances)
-
-
-def test_ties_go_to_the_hint():
-    X, F = in_order(*zoo.square())
-    for hint in (0, 1):
-        faces, _, _ = closest(X, F, np.array([[0.5, 0.5, 0.0], [0.5, 0.5, 2.0]]), [hint, hint])
-        assert faces.tolist() == [hint, hint]
+    hints = range(0, len(faces_of(mesh)), 7)
+    distances = [closest(mesh, P, np.full(len(P), hint))[2] for hint in hints]
+    assert all(distance == pytest.approx(distances[0], rel=1e-13) for distance in distances)
 
 
 @pytest.mark.parametrize("count", [1, 2, 4, 5, 16, 17, 64, 65, 257])
 def test_every_size_of_tree(count):
-    V = RNG.random((3 * count, 3))
-    X, F = in_order(V, np.arange(3 * count).reshape(-1, 3))
-    tree = build_tree(X, F, False)
+    """A soup of separate triangles: walks end where they start, the search does it all."""
+    mesh = built(RNG.random((3 * count, 3)), np.arange(3 * count).reshape(-1, 3), ordered=True)
+    tree = tree_of(mesh)
     assert tree.level[-1] == len(tree.boxes) and tree.level[-1] - tree.level[-2] == 1
-    assert tree.boxes[-1] == pytest.approx(np.r_[X[:, :3].min(axis=0), X[:, :3].max(axis=0)])
+    whole = np.r_[mesh.X[:, :3].min(axis=0), mesh.X[:, :3].max(axis=0)]
+    assert np.array_equal(tree.boxes[-1], whole)
     P = RNG.normal(size=(30, 3))
-    squared, _, _ = igl.point_mesh_squared_distance(P, X[:, :3].copy(), F.astype(np.int64))
-    assert closest(X, F, P)[2] == pytest.approx(np.sqrt(squared))
+    assert closest(mesh, P)[2] == pytest.approx(truth(mesh, P)[0])
+
+
+@pytest.mark.parametrize("name", ["torus", "planar_delaunay", "cylinder", "genus_3", "sliver_fan"])
+def test_a_walk_ends_no_farther_than_it_starts(name):
+    mesh = built(*zoo.ZOO[name].make(), ordered=True)
+    size = np.ptp(mesh.X[:, :3], axis=0).max()
+    P = mesh.X[:, :3].mean(axis=0) + size * RNG.normal(size=(200, 3))
+    hints = RNG.integers(len(faces_of(mesh)), size=len(P))
+    _, points, walked = closest(mesh, P, hints, trust=np.inf)
+    corners = mesh.X[faces_of(mesh)[hints], :3]
+    start = [naive.closest_on_triangle(p, *T)[1] for p, T in zip(P, corners, strict=True)]
+    assert (walked <= np.array(start) * (1 + 1e-12)).all()
+    assert (walked >= truth(mesh, P)[0] * (1 - 1e-12)).all()
+    assert np.linalg.norm(P - points, axis=1) == pytest.approx(walked, rel=1e-9)
+
+
+def test_a_walk_finds_the_closest_face_of_a_convex_surface():
+    mesh = built(*zoo.icosphere(3), ordered=True)
+    P = RNG.normal(size=(300, 3))
+    P *= 1.3 / np.linalg.norm(P, axis=1, keepdims=True)
+    distance = truth(mesh, P)[0]
+    near = np.linalg.norm(mesh.X[faces_of(mesh), :3].mean(axis=1) - P[:, None], axis=2)
+    hints = np.argsort(near, axis=1)[:, 20]  # a few faces away
+    found = closest(mesh, P, hints, trust=np.inf)[2]
+    assert found == pytest.approx(distance, rel=1e-9)
 
 
 def test_parallel_is_the_same():
-    X, F = in_order(*zoo.icosphere(3))
-    for one, two in zip(build_tree(X, F, False), build_tree(X, F, True), strict=True):
+    mesh = built(*zoo.icosphere(3), ordered=True)
+    for one, two in zip(tree_of(mesh), tree_of(mesh, True), strict=True):
         assert one.tobytes() == two.tobytes()

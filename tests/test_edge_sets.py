@@ -6,10 +6,9 @@ import pytest
 import zoo
 from remeshvec import edge_sets
 from remeshvec._types import Blocks
-from remeshvec.bvh import build_tree
 from remeshvec.edge_sets import OWNED, REST, SHIFTED, list_range, stage_blocks, vertex_range
 from remeshvec.operations import collapse, flip, untangle
-from structure import assert_same_bits, blocks_of, built, copied, half_edge
+from structure import assert_same_bits, blocks_of, built, copied, half_edge, tree_of
 
 
 @pytest.mark.parametrize("per_block", [4, 17, 50, 10_000])
@@ -187,7 +186,7 @@ def test_a_move_owns_the_closed_ring_of_its_vertex():
         mesh = built(W, G)
         candidates = np.full(len(W), new[centre], np.int32)
         moved, count = np.zeros(2, np.int64), np.array([1, 0])
-        tree = build_tree(mesh.X, G.astype(np.int32), False)
+        tree = tree_of(mesh)
         blocks = all_but_the_last_vertex(mesh)
         untangle._untangle(
             False, mesh, blocks, OWNED, tree, False, np.cos(0.8), candidates, count, moved

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 import zoo
 from remeshvec._types import APEX, BOUNDARY, FIXED, INNER
-from remeshvec.operations.project import locate_vertices, project_boundary, project_vertices
+from remeshvec.operations.project import project_boundary
 from remeshvec.prepare import build_reference
-from structure import assert_valid, built, copied, one_block
+from structure import assert_valid, built, copied, locate, one_block, project
 
 MESHES = ["icosphere", "torus", "genus_2", "planar_delaunay", "annulus", "grid", "two_components"]
 
@@ -40,7 +40,7 @@ def places(reference, faces, barycentric):
 def test_inner_vertices_go_to_the_closest_point(name, amount):
     mesh, reference = moved(name, amount)
     before = mesh.X[:, :3].copy()
-    project_vertices(mesh, one_block(mesh), reference, False)
+    project(mesh, reference)
     inner = mesh.kind == INNER
     found, _ = distance(reference, mesh.X[inner, :3].copy())
     assert found.max(initial=0) < 1e-12 * np.abs(reference.X).max()
@@ -53,7 +53,7 @@ def test_inner_vertices_go_to_the_closest_point(name, amount):
 @pytest.mark.parametrize("name", ["sliver_fan", "annulus", "grid", "cylinder"])
 def test_boundary_vertices_stay_on_the_boundary(name):
     mesh, reference = moved(name, 0.3)
-    project_vertices(mesh, one_block(mesh), reference, False)
+    project(mesh, reference)
     rim = mesh.kind == BOUNDARY
     assert rim.any()
     F = reference.origin.reshape(-1, 3)
@@ -71,7 +71,7 @@ def test_fixed_vertices_stay():
     mesh, reference = moved("grid", 0.2)
     mesh.kind[:] = FIXED
     before = copied(mesh)
-    project_vertices(mesh, one_block(mesh), reference, False)
+    project(mesh, reference)
     assert np.array_equal(mesh.X, before.X)
 
 
@@ -88,9 +88,9 @@ def test_project_boundary_leaves_the_inside_alone():
 @pytest.mark.parametrize("name", MESHES)
 def test_births_reproduce_projected_vertices(name):
     mesh, reference = moved(name, 0.3)
-    project_vertices(mesh, one_block(mesh), reference, False)
+    project(mesh, reference)
     before = mesh.X.copy()
-    weights = locate_vertices(mesh, one_block(mesh), reference, False)
+    weights = locate(mesh, reference)
     assert np.array_equal(mesh.X, before)
     assert weights.min() >= -1e-15 and weights.sum(axis=1) == pytest.approx(1)
     assert places(reference, mesh.birth // 3, weights) == pytest.approx(before[:, :3], abs=1e-12)
@@ -98,7 +98,7 @@ def test_births_reproduce_projected_vertices(name):
 
 def test_births_of_others_are_the_closest_points():
     mesh, reference = moved("torus", 0.5)
-    weights = locate_vertices(mesh, one_block(mesh), reference, False)
+    weights = locate(mesh, reference)
     shortest, _ = distance(reference, mesh.X[:, :3].copy())
     found = np.linalg.norm(places(reference, mesh.birth // 3, weights) - mesh.X[:, :3], axis=1)
     assert found == pytest.approx(shortest, rel=1e-9)
@@ -106,7 +106,7 @@ def test_births_of_others_are_the_closest_points():
 
 def test_a_second_projection_changes_nothing_but_rounding():
     mesh, reference = moved("genus_3", 0.4)
-    project_vertices(mesh, one_block(mesh), reference, False)
+    project(mesh, reference)
     before = mesh.X.copy()
-    project_vertices(mesh, one_block(mesh), reference, False)
+    project(mesh, reference)
     assert mesh.X == pytest.approx(before, abs=1e-14)

@@ -48,7 +48,7 @@ def _measure_gaps(mesh, blocks, tree, gaps):
             x = (X[a, 0] + X[b, 0] + X[c, 0]) / 3.0
             y = (X[a, 1] + X[b, 1] + X[c, 1]) / 3.0
             z = (X[a, 2] + X[b, 2] + X[c, 2]) / 3.0
-            g, s, t, _ = closest_face(tree, x, y, z, np.int64(mesh.birth[a]) // 3, stack)
+            g, s, t, _ = closest_face(tree, x, y, z, np.int64(mesh.birth[a]) // 3, 0.0, stack)
             qx, qy, qz = point_on_face(tree.corners, g, s, t)
             gap = (qx - x) * nx + (qy - y) * ny + (qz - z) * nz
             gaps[f, 0], gaps[f, 1], gaps[f, 2], gaps[f, 3] = nx, ny, nz, gap

@@ -30,9 +30,15 @@ class Reference(NamedTuple):
     links: IndexArray  # (2, 3 m), see `boundary.link_boundary`
 
 
-def project_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
-    """Move inner and boundary vertices to the closest points of the reference surface."""
-    _project_inner(parallel, mesh, blocks, reference.tree, mesh.X, mesh.birth)
+def project_vertices(
+    mesh: Mesh, blocks: Blocks, reference: Reference, trust: float, parallel: bool
+) -> None:
+    """Move inner and boundary vertices to the closest points of the reference surface.
+
+    Inner vertices walk there from where they were the last time; the whole surface is searched for
+    those that end farther than ``trust`` from it.
+    """
+    _project_inner(parallel, mesh, blocks, reference.tree, trust * trust, mesh.X, mesh.birth)
     project_boundary(mesh, blocks, reference, parallel)
 
 
@@ -42,8 +48,12 @@ def project_boundary(mesh: Mesh, blocks: Blocks, reference: Reference, parallel:
         _project_boundary(parallel, mesh, blocks, *reference[1:], mesh.X, mesh.birth)
 
 
-def locate_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> FloatArray:
+def locate_vertices(
+    mesh: Mesh, blocks: Blocks, reference: Reference, trust: float, parallel: bool
+) -> FloatArray:
     """Find where every vertex lies without moving it; sets ``mesh.birth``.
+
+    ``trust`` as in `project_vertices`: inf for vertices that were just projected.
 
     Returns
     -------
@@ -52,19 +62,19 @@ def locate_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: 
         the vertex.
     """
     barycentric = np.zeros((mesh.vertex_halfedge.size, 3))
-    _locate(parallel, mesh, blocks, *reference, mesh.birth, barycentric)
+    _locate(parallel, mesh, blocks, *reference, trust * trust, mesh.birth, barycentric)
     return barycentric
 
 
 @driver
-def _project_inner(mesh, blocks, tree, X, birth):
+def _project_inner(mesh, blocks, tree, trust, X, birth):
     for k in prange(blocks.vertex.size - 1):
         stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != INNER:
                 continue
             hint = np.int64(birth[v]) // 3
-            f, s, t, _ = closest_face(tree, X[v, 0], X[v, 1], X[v, 2], hint, stack)
+            f, s, t, _ = closest_face(tree, X[v, 0], X[v, 1], X[v, 2], hint, trust, stack)
             birth[v] = 3 * f
             X[v, 0], X[v, 1], X[v, 2] = point_on_face(tree.corners, f, s, t)
 
@@ -86,7 +96,7 @@ def _project_boundary(mesh, blocks, X_in, origin, links, X, birth):
 
 
 @driver
-def _locate(mesh, blocks, tree, X_in, origin, links, birth, barycentric):
+def _locate(mesh, blocks, tree, X_in, origin, links, trust, birth, barycentric):
     for k in prange(blocks.vertex.size - 1):
         stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
@@ -95,7 +105,7 @@ def _locate(mesh, blocks, tree, X_in, origin, links, birth, barycentric):
             x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
             hint = np.int64(birth[v])
             if mesh.twin[mesh.vertex_halfedge[v]] != NONE:
-                f, s, t, _ = closest_face(tree, x, y, z, hint // 3, stack)
+                f, s, t, _ = closest_face(tree, x, y, z, hint // 3, trust, stack)
                 birth[v] = 3 * f
                 barycentric[v, 0] = 1.0 - s - t
                 barycentric[v, 1] = s

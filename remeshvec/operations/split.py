@@ -12,14 +12,16 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from .._jit import driver, kernel
+from .._jit import driver, inlined, kernel
 from .._types import BOUNDARY, DEAD, INNER, NONE, Blocks, Mesh
-from ..geometry import distance_squared
+from ..geometry import distance_squared, face_vector
 
 __all__ = ["MAX_ROUNDS", "compact", "split_long_edges"]
 
 # Every round halves the longest edge: 64 rounds divide any float64 length below any other.
 MAX_ROUNDS = 64
+
+_GONE = 255  # mask of a removed face
 
 # Child triangles of a face by its mask of long edges (bit i: edge i from corner i to i + 1); with
 # two long edges bit 3 chooses the diagonal. Entries 0-2 are corners, 3-5 midpoints of edges 0-2.
@@ -85,24 +87,24 @@ def split_long_edges(
     n_split : int
         Edges split; call again until it is 0.
     """
-    mask = np.empty(mesh.origin.size // 3, np.uint8)
-    sizes = np.zeros((len(blocks.face) - 1, 4), np.int64)
-    _mark_long_edges(parallel, mesh, blocks, longest * longest, mask, sizes)
-    n_split = int(sizes[:, 2].sum())
-    return (_refine(mesh, blocks, mask, sizes, parallel) if n_split else mesh), n_split
+    asked = np.empty(mesh.origin.size // 3, np.uint8)
+    count = np.zeros(len(blocks.face) - 1, np.int64)
+    _ask_for_splits(parallel, mesh, blocks, longest * longest, asked, count)
+    return _refine(mesh, blocks, asked, parallel) if count.any() else (mesh, 0)
 
 
 def compact(mesh: Mesh, blocks: Blocks, parallel: bool) -> Mesh:
     """Drop removed faces and vertices, keeping the order: a split of no edge."""
-    mask = np.empty(mesh.origin.size // 3, np.uint8)
-    sizes = np.zeros((len(blocks.face) - 1, 4), np.int64)
-    _mark_long_edges(parallel, mesh, blocks, np.inf, mask, sizes)
-    return _refine(mesh, blocks, mask, sizes, parallel)
+    asked = np.zeros(mesh.origin.size // 3, np.uint8)
+    asked[mesh.origin[::3] == DEAD] = _GONE
+    return _refine(mesh, blocks, asked, parallel)[0]
 
 
-def _refine(
-    mesh: Mesh, blocks: Blocks, mask: np.ndarray, sizes: np.ndarray, parallel: bool
-) -> Mesh:
+def _refine(mesh: Mesh, blocks: Blocks, asked: np.ndarray, parallel: bool) -> tuple[Mesh, int]:
+    """Write the mesh anew with the edges split that any face asks for; returns their number too."""
+    mask = np.empty_like(asked)
+    sizes = np.zeros((len(blocks.face) - 1, 3), np.int64)
+    _mark_edges(parallel, mesh, blocks, asked, mask, sizes)
     starts = np.zeros_like(sizes)
     np.cumsum(sizes[:-1], axis=0, out=starts[1:])
     n_faces = int(sizes[:, 0].sum())
@@ -123,51 +125,93 @@ def _refine(
     numbers = (mask, first_child, new_vertex, middle)
     _write_faces(parallel, mesh, blocks, *numbers, refined.origin, refined.twin)
     _write_vertices(parallel, mesh, blocks, *numbers, *refined[2:])
-    if sizes[:, 2].any():
+    n_split = int(sizes[:, 2].sum())
+    if n_split:
         _update_valences(mesh, mask, new_vertex, middle, refined)
-    return refined
+    return refined, n_split
 
 
 @driver
-def _mark_long_edges(mesh, blocks, longest_squared, mask, sizes):
-    """Mask of long edges a face; per block: children, vertices owned, edges split."""
+def _ask_for_splits(mesh, blocks, longest_squared, asked, count):
+    """Mask of the edges that each face wants split: the too long ones.
+
+    A face lower than half the limit wants only its longest edge split: all three at once, a needle of
+    length l would fall into (l / L)^2 faces instead of 2 l / L.
+    """
+    for k in prange(blocks.face.size - 1):
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            asked[f] = _GONE
+            if mesh.origin[3 * f] != DEAD:
+                a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
+                asked[f] = _long_edges(mesh.X, a, b, c, longest_squared)
+                count[k] += asked[f] != 0
+
+
+@inlined
+def _long_edges(X, a, b, c, longest_squared):
+    l0 = distance_squared(X, a, b)
+    l1 = distance_squared(X, b, c)
+    l2 = distance_squared(X, c, a)
+    mask = (l0 > longest_squared) + 2 * (l1 > longest_squared) + 4 * (l2 > longest_squared)
+    if mask == 0 or mask == 1 or mask == 2 or mask == 4:
+        return mask
+    nx, ny, nz = face_vector(
+        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
+    )
+    longest = max(l0, l1, l2)
+    if nx * nx + ny * ny + nz * nz >= 0.25 * longest_squared * longest:
+        return mask
+    return 1 if l0 == longest else (2 if l1 == longest else 4)
+
+
+@driver
+def _mark_edges(mesh, blocks, asked, mask, sizes):
+    """Mask of the edges to split a face, those that either face asks for, and the diagonal.
+
+    Sizes per block: children, vertices owned, edges split.
+    """
     for k in prange(blocks.face.size - 1):
         children = 0
         owned = 0
         split = 0
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            a = mesh.origin[3 * f]
-            if a == DEAD:
-                mask[f] = 255
+            m = np.int64(asked[f])
+            if m == _GONE:
+                mask[f] = _GONE
                 continue
-            b = mesh.origin[3 * f + 1]
-            c = mesh.origin[3 * f + 2]
-            l0 = distance_squared(mesh.X, a, b)
-            l1 = distance_squared(mesh.X, b, c)
-            l2 = distance_squared(mesh.X, c, a)
-            m = 0
-            if l0 > longest_squared:
-                m |= 1
-            if l1 > longest_squared:
-                m |= 2
-            if l2 > longest_squared:
-                m |= 4
-            # The shorter diagonal of the quad, from the edges' lengths: the midpoint of the longer
-            # of the two split edges is farther from the other end of its edge, and so the diagonal
-            # to that midpoint is the shorter one.
-            if (m == 3 and l1 > l0) or (m == 6 and l2 > l1) or (m == 5 and l0 > l2):
-                m |= 8
-            mask[f] = m
-            children += _COUNT[m]
             for i in range(3):
                 h = 3 * f + i
+                t = np.int64(mesh.twin[h])
+                if t != NONE:
+                    g = t // 3
+                    m |= ((np.int64(asked[g]) >> (t - 3 * g)) & 1) << i
                 if mesh.vertex_halfedge[mesh.origin[h]] == h:
                     owned += 1
-                if (m >> i) & 1 and mesh.twin[h] < h:
+                if (m >> i) & 1 and t < h:
                     split += 1
+            if m == 3 or m == 5 or m == 6:
+                m = _choose_diagonal(mesh, f, m)
+            mask[f] = m
+            children += _COUNT[m]
         sizes[k, 0] = children
         sizes[k, 1] = owned
         sizes[k, 2] = split
+
+
+@inlined
+def _choose_diagonal(mesh, f, m):
+    """Add bit 3 where the shorter diagonal of the quad is the second one of the template.
+
+    The shorter one ends at the midpoint of the longer of the two split edges: of two medians, the
+    one to the longer edge is shorter.
+    """
+    a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
+    l0 = distance_squared(mesh.X, a, b)
+    l1 = distance_squared(mesh.X, b, c)
+    l2 = distance_squared(mesh.X, c, a)
+    if (m == 3 and l1 > l0) or (m == 6 and l2 > l1) or (m == 5 and l0 > l2):
+        return m | 8
+    return m
 
 
 @driver
@@ -178,7 +222,7 @@ def _number(mesh, blocks, mask, starts, first_child, new_vertex, middle):
         vertex = starts[k, 1] + starts[k, 2]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
-            if m == 255:
+            if m == _GONE:
                 continue
             first_child[f] = child
             child += _COUNT[m]
@@ -201,7 +245,7 @@ def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, origin, tw
         ids = np.empty(6, np.int64)
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
-            if m == 255:
+            if m == _GONE:
                 continue
             base = 3 * np.int64(first_child[f])
             for i in range(3):
@@ -235,7 +279,7 @@ def _write_vertices(
     for k in prange(blocks.face.size - 1):
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
-            if m == 255:
+            if m == _GONE:
                 continue
             base = 3 * np.int64(first_child[f])
             for i in range(3):
@@ -270,7 +314,7 @@ def _update_valences(mesh, mask, new_vertex, middle, refined):
     """
     for f in range(mask.size):
         m = np.int64(mask[f])
-        if m == 0 or m == 255:
+        if m == 0 or m == _GONE:
             continue
         for i in range(3):
             h = 3 * f + i

@@ -14,7 +14,7 @@ from numba import prange
 
 from .._jit import driver, inlined
 from .._types import DEAD, INNER, NONE, Blocks, Mesh, Tree
-from ..bvh import STACK, closest_face, point_on_face
+from ..bvh import point_on_face, walk_to_face
 from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
 from ..geometry import face_vector, tangent_basis, turn_exceeds
 from ..halfedge import following, previous
@@ -39,8 +39,8 @@ def untangle_vertices(
 ) -> int:
     """Improve rings with an angle below ``acos(cosine)``; returns how many vertices moved.
 
-    With ``on_surface`` every trial position is the closest point of the reference surface, so that
-    no projection spoils afterwards what was gained.
+    With ``on_surface`` every trial position is the closest point that a walk on the reference surface
+    finds, so that no projection spoils afterwards what was gained.
     """
     candidates = np.empty(mesh.vertex_halfedge.size, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
@@ -79,7 +79,6 @@ def _untangle(mesh, blocks, stage, tree, on_surface, cosine, candidates, count, 
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
         ring = np.empty((_CAPACITY, 3))
-        stack = np.empty((2, STACK), np.int64)
         for j in range(first, end):
             for i in range(blocks.vertex[j], blocks.vertex[j] + count[j]):
                 v = np.int64(candidates[i])
@@ -90,9 +89,7 @@ def _untangle(mesh, blocks, stage, tree, on_surface, cosine, candidates, count, 
                 )
                 if n > 0:
                     candidates[i] = DONE
-                    moved[k] += _search(
-                        mesh.X, mesh.birth, v, ring, n, tree, on_surface, cosine, stack
-                    )
+                    moved[k] += _search(mesh.X, mesh.birth, v, ring, n, tree, on_surface, cosine)
 
 
 @inlined
@@ -153,7 +150,7 @@ def _largest_cosine(ring, n, x, y, z, x0, y0, z0):
 
 
 @inlined
-def _search(X, birth, v, ring, n, tree, on_surface, cosine, stack):
+def _search(X, birth, v, ring, n, tree, on_surface, cosine):
     """Pattern search; returns 1 if the vertex moved."""
     x, y, z = X[v, 0], X[v, 1], X[v, 2]
     nx = ny = nz = length = 0.0
@@ -185,7 +182,7 @@ def _search(X, birth, v, ring, n, tree, on_surface, cosine, stack):
             cx, cy, cz = x + s * sx + t * tx, y + s * sy + t * ty, z + s * sz + t * tz
             f = face
             if on_surface:
-                f, s, t, _ = closest_face(tree, cx, cy, cz, face, stack)
+                f, s, t, _ = walk_to_face(tree, cx, cy, cz, face)
                 cx, cy, cz = point_on_face(tree.corners, f, s, t)
             trial = _largest_cosine(ring, n, cx, cy, cz, X[v, 0], X[v, 1], X[v, 2])
             if trial < better:

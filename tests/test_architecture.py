@@ -1,0 +1,177 @@
+"""The layers: imports run downwards only, no cycles, short files, a light `import remeshvec`."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "remeshvec"
+
+# Lower numbers may not import higher ones; the same number may not import itself but for `SIDEWAYS`.
+LEVELS = {
+    0: ["_types", "_jit", "_check", "errors"],
+    1: ["geometry"],
+    2: ["halfedge", "order", "edge_sets", "bvh", "boundary", "clean"],
+    3: ["quality", "distance", "features"],
+    4: [
+        "operations", "operations.split", "operations.collapse", "operations.flip",
+        "operations.relax", "operations.project", "operations.untangle", "operations.fit",
+    ],
+    5: ["options", "prepare", "report", "remesh"],
+    6: ["_file_guards", "_ply_guard", "_mesh_writers", "mesh_files"],
+    7: ["viz", "_arguments", "cli"],
+    8: ["__main__"],
+}  # fmt: skip
+SIDEWAYS = {
+    ("_check", "errors"),
+    ("boundary", "halfedge"), ("bvh", "halfedge"),
+    ("distance", "quality"),
+    ("prepare", "options"), ("report", "options"),
+    ("remesh", "options"), ("remesh", "prepare"), ("remesh", "report"),
+    ("_ply_guard", "_file_guards"), ("_file_guards", "_ply_guard"), ("_mesh_writers", "_file_guards"),
+    ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
+    ("cli", "_arguments"), ("cli", "viz"),
+}  # fmt: skip
+LEVEL = {name: level for level, names in LEVELS.items() for name in names}
+
+
+def modules():
+    """Module names inside the package, with their files; the package itself is left out."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        name = ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
+        if name != "__init__":
+            yield name, path
+
+
+def imports(name, path):
+    """Modules of the package that a module imports, also inside functions."""
+    package = ["remeshvec", *name.split(".")]
+    if path.name != "__init__.py":
+        package.pop()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) + 1 - node.level] if node.level else []
+            whole = ".".join([*base, *([node.module] if node.module else [])])
+            found = [whole, *(f"{whole}.{alias.name}" for alias in node.names)]
+        else:
+            continue
+        for target in found:
+            inner = target.removeprefix("remeshvec.")
+            if inner != target and inner in LEVEL:
+                yield inner
+
+
+ALL = dict(modules())
+GRAPH = {name: set(imports(name, path)) - {name} for name, path in ALL.items()}
+
+
+def test_every_module_has_a_level():
+    assert set(ALL) == set(LEVEL)
+
+
+def test_the_graph_is_seen():
+    """The test of the test: relative imports of all kinds are found."""
+    assert {"options", "prepare", "_jit", "operations.split"} <= GRAPH["remesh"]
+    assert {"_jit", "_types", "edge_sets", "geometry", "halfedge"} <= GRAPH["operations.collapse"]
+    assert "errors" in GRAPH["_check"]
+
+
+@pytest.mark.parametrize("name", sorted(ALL))
+def test_imports_run_downwards(name):
+    for other in GRAPH[name]:
+        if other == "operations" or (name == "operations"):
+            continue
+        allowed = LEVEL[other] < LEVEL[name] or (name, other) in SIDEWAYS
+        assert allowed, f"{name} (level {LEVEL[name]}) imports {other} (level {LEVEL[other]})"
+
+
+def test_operations_and_fields_meet_in_policy_only():
+    fields = LEVELS[3]
+    for name in LEVELS[4]:
+        assert not GRAPH[name] & set(fields)
+        assert not {other for other in GRAPH[name] if other.startswith("operations.")}
+    for name in fields:
+        assert not {other for other in GRAPH[name] if other.startswith("operations")}
+
+
+def test_no_cycles():
+    done, path = set(), []
+
+    def visit(name):
+        assert name not in path, " -> ".join([*path[path.index(name) :], name])
+        if name in done:
+            return
+        path.append(name)
+        for other in sorted(GRAPH[name]):
+            visit(other)
+        path.pop()
+        done.add(name)
+
+    for name in GRAPH:
+        visit(name)
+
+
+@pytest.mark.parametrize("path", [*ALL.values(), *sorted((ROOT / "tests").glob("*.py"))], ids=lambda p: p.stem)
+def test_files_are_short(path):
+    limit = 420 if path.is_relative_to(PACKAGE) else 520
+    assert len(path.read_text().splitlines()) <= limit
+
+
+def test_numba_flags_live_in_one_module():
+    for name, path in ALL.items():
+        if name == "_jit":
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module == "numba":
+                assert {alias.name for alias in node.names} == {"prange"}, name
+            if isinstance(node, ast.Import):
+                assert not any(alias.name.startswith("numba") for alias in node.names), name
+
+
+def test_kernels_never_raise():
+    """A `raise` inside `prange` silently makes the loop serial."""
+    for name, path in ALL.items():
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef) and any(
+                isinstance(d, ast.Name) and d.id in ("inlined", "kernel", "driver")
+                for d in node.decorator_list
+            ):
+                bad = [n for n in ast.walk(node) if isinstance(n, ast.Raise | ast.Assert | ast.Try)]
+                assert not bad, f"{name}.{node.name}"
+
+
+def python(code, **env):
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": str(ROOT), **env},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
+
+
+def test_import_is_light():
+    loaded = set(python("import remeshvec, sys; print(*sys.modules)"))
+    # Numba itself imports the package scipy, to see that it is there, but none of its parts.
+    parts = {"scipy.sparse", "scipy.spatial", "scipy.linalg", "scipy.special", "scipy.stats"}
+    others = {"igl", "trimesh", "pyvista", "meshio", "plyfile", "matplotlib", "pytest", "vtk"}
+    assert not (parts | others) & loaded
+    assert {"numba", "numpy", "remeshvec.remesh"} <= loaded
+
+
+def test_a_call_needs_neither_scipy_nor_libigl():
+    code = (
+        "import sys\n"
+        "from remeshvec import remesh\n"
+        "V, F = remesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], 0.5)\n"
+        "print(*sys.modules)"
+    )
+    assert not {"scipy.sparse", "scipy.spatial", "igl"} & set(python(code))
