@@ -54,6 +54,18 @@ def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument("--iterations", type=_at_least_one, metavar="N", help="number of sweeps")
     group.add_argument(
+        "--split",
+        type=_positive,
+        metavar="X",
+        help="split edges longer than this multiple of the target length",
+    )
+    group.add_argument(
+        "--collapse",
+        type=_positive,
+        metavar="X",
+        help="collapse edges shorter than this multiple of the target length",
+    )
+    group.add_argument(
         "--foldover",
         type=_positive,
         metavar="DEG",
@@ -69,6 +81,12 @@ def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
         "--no-project",
         action="store_true",
         help="do not put the vertices back onto the input surface",
+    )
+    group.add_argument(
+        "--fit",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="let vertices leave the input a little so that faces lie closer to it",
     )
     group.add_argument("--threads", type=_at_least_one, metavar="N", help="number of threads")
 

@@ -124,9 +124,12 @@ def _library_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return those options that were given, so that the presets decide on the others."""
     given = {
         "iterations": options.iterations,
+        "split": options.split,
+        "collapse": options.collapse,
         "foldover": options.foldover,
         "sliver_check": options.sliver_check,
         "project": False if options.no_project else None,
+        "fit": options.fit,
         "threads": options.threads,
     }
     return {"preset": options.preset} | {k: v for k, v in given.items() if v is not None}

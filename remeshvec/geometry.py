@@ -173,7 +173,9 @@ def closest_on_triangle(px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz):
     nn = nx * nx + ny * ny + nz * nz
     s = (qy * wz - qz * wy) * nx + (qz * wx - qx * wz) * ny + (qx * wy - qy * wx) * nz
     t = (uy * qz - uz * qy) * nx + (uz * qx - ux * qz) * ny + (ux * qy - uy * qx) * nz
-    if s >= 0.0 and t >= 0.0 and s + t <= nn and nn > 0.0:
+    # Below an angle of 1e-9 the normal is rounding; the edges are then as close.
+    flat = 1e-18 * (ux * ux + uy * uy + uz * uz) * (wx * wx + wy * wy + wz * wz)
+    if s >= 0.0 and t >= 0.0 and s + t <= nn and nn > flat:
         s /= nn
         t /= nn
         x = qx - s * ux - t * wx

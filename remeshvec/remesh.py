@@ -96,7 +96,7 @@ def remesh(
         Let vertices leave the input by up to 0.2 L so that faces straddle it: about a quarter less RMS
         distance. On in ``"fine"``.
     threads : int, optional
-        Threads to use at most; all by default. Meshes below 20,000 faces use one.
+        Threads to use at most; all by default. Meshes below 50,000 faces use one.
     max_faces : int
         An ``L`` that would give more faces than this is refused before any work.
     callback : callable, optional

@@ -6,6 +6,7 @@ from collections import defaultdict
 from itertools import combinations
 
 import numpy as np
+
 from remeshvec.geometry import SHARP
 
 Face = tuple[int, int, int]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import topology
+
 from remeshvec._types import APEX, BOUNDARY, DEAD, FIXED, INNER, NONE, Blocks, Mesh, Tree
 from remeshvec.bvh import build_tree
 from remeshvec.edge_sets import make_blocks
@@ -62,7 +63,7 @@ def faces_of(mesh: Mesh) -> np.ndarray:
 def half_edge(mesh: Mesh, a: int, b: int) -> int:
     """Find the half-edge from a to b."""
     F = mesh.origin.reshape(-1, 3)
-    f, c = np.nonzero((F == a) & (np.roll(F, -1, axis=1) == b))
+    f, c = np.nonzero((a == F) & (np.roll(F, -1, axis=1) == b))
     assert len(f) == 1
     return int(3 * f[0] + c[0])
 

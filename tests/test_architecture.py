@@ -117,7 +117,9 @@ def test_no_cycles():
         visit(name)
 
 
-@pytest.mark.parametrize("path", [*ALL.values(), *sorted((ROOT / "tests").glob("*.py"))], ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path", [*ALL.values(), *sorted((ROOT / "tests").glob("*.py"))], ids=lambda p: p.stem
+)
 def test_files_are_short(path):
     limit = 420 if path.is_relative_to(PACKAGE) else 520
     assert len(path.read_text().splitlines()) <= limit

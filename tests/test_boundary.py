@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 import zoo
+from structure import built
+
 from remeshvec._jit import kernel
 from remeshvec._types import NONE
 from remeshvec.boundary import closest_on_boundary, link_boundary
 from remeshvec.features import apexes, boundary_corners
-from structure import built
 
 
 def corners_of(V, F, length):
@@ -70,7 +71,9 @@ def test_a_rectangle_has_four(spacing, length):
     points = [[0, 0], [3, 0], [3, 2], [0, 2]]
     V, F = polygon(points, spacing)
     found = V[corners_of(V, F, length), :2]
-    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, np.array(points, float).tolist()))
+    assert sorted(map(tuple, found.tolist())) == sorted(
+        map(tuple, np.array(points, float).tolist())
+    )
 
 
 @pytest.mark.parametrize("length", [0.05, 0.3, 0.6])
@@ -80,7 +83,9 @@ def test_an_l_has_six(length):
     V, F = polygon(points, 0.1)
     V[-1, :2] = 0.7  # the fan's centre must see all of it
     found = V[corners_of(V, F, length), :2]
-    assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, np.array(points, float).tolist()))
+    assert sorted(map(tuple, found.tolist())) == sorted(
+        map(tuple, np.array(points, float).tolist())
+    )
 
 
 def test_a_grid_keeps_its_corners_whatever_the_length():
@@ -142,7 +147,9 @@ def query(X, origin, links, start, P, found, parameter, squared):
 
 def closest(mesh, start, P):
     found, s, squared = np.empty(len(P), int), np.empty(len(P)), np.empty(len(P))
-    query(mesh.X, mesh.origin, link_boundary(mesh), np.asarray(start, np.int64), P, found, s, squared)
+    query(
+        mesh.X, mesh.origin, link_boundary(mesh), np.asarray(start, np.int64), P, found, s, squared
+    )
     a = mesh.X[mesh.origin[found], :3]
     b = mesh.X[mesh.origin[np.where(found % 3 == 2, found - 2, found + 1)], :3]
     return a + s[:, None] * (b - a), np.sqrt(squared)

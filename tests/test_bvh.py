@@ -5,9 +5,10 @@ import naive
 import numpy as np
 import pytest
 import zoo
+from structure import built, faces_of, tree_of
+
 from remeshvec._jit import kernel
 from remeshvec.bvh import STACK, closest_face
-from structure import built, faces_of, tree_of
 
 RNG = np.random.default_rng(11)
 
@@ -40,7 +41,16 @@ def truth(mesh, P):
     return np.sqrt(squared), points
 
 
-NAMES = ["triangle", "square", "tetrahedron", "torus", "genus_3", "thin_sheet", "bipyramid", "bowtie"]
+NAMES = [
+    "triangle",
+    "square",
+    "tetrahedron",
+    "torus",
+    "genus_3",
+    "thin_sheet",
+    "bipyramid",
+    "bowtie",
+]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -123,12 +123,16 @@ def test_default_options_are_left_to_the_library(sheet, asked):
 
 def test_options_reach_the_library(sheet, asked):
     flags = "--length 0.2 --preset fast --iterations 2 --foldover 30 --no-sliver-check"
+    flags += " --split 1.5 --collapse 0.5 --no-fit"
     assert main([sheet, *flags.split(), "--no-project", "--threads", "1", "--quiet"]) == 0
     assert asked == [
         {
             "L": 0.2,
             "preset": "fast",
             "iterations": 2,
+            "split": 1.5,
+            "collapse": 0.5,
+            "fit": False,
             "foldover": 30.0,
             "sliver_check": False,
             "project": False,

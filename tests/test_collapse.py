@@ -5,6 +5,18 @@ import numpy as np
 import pytest
 import topology
 import zoo
+from structure import (
+    assert_same_bits,
+    assert_valid,
+    blocks_of,
+    built,
+    copied,
+    faces_of,
+    half_edge,
+    one_block,
+    shape_of,
+)
+
 from remeshvec._types import BOUNDARY, DEAD, FIXED
 from remeshvec.operations.collapse import (
     COLLAPSED,
@@ -18,17 +30,6 @@ from remeshvec.operations.collapse import (
     CollapseLimits,
     collapse_short_edges,
     keeps_boundary,
-)
-from structure import (
-    assert_same_bits,
-    assert_valid,
-    blocks_of,
-    built,
-    copied,
-    faces_of,
-    half_edge,
-    one_block,
-    shape_of,
 )
 
 
@@ -59,7 +60,9 @@ def pulled(V, a, b, length=0.1):
 # --- what a collapse makes -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["octahedron", "icosahedron", "torus", "grid", "annulus", "genus_2"])
+@pytest.mark.parametrize(
+    "name", ["octahedron", "icosahedron", "torus", "grid", "annulus", "genus_2"]
+)
 def test_each_single_collapse_is_that_of_the_twin(name):
     """Every edge in turn, as the only candidate; with the guards of geometry as far off as they go."""
     V, F = zoo.ZOO[name].make()
@@ -151,7 +154,9 @@ def test_link_condition_tetrahedron():
     mesh = built(pulled(V, 0, 1), F)
     assert naive.neighbours(F)[0] & naive.neighbours(F)[1] == {2, 3}  # a weaker rule is content
     assert not naive.link_condition(F, 0, 1)
-    assert len(naive.collapse(F, 0, 1)) == topology.duplicate_faces(naive.collapse(F, 0, 1)) + 1 == 2
+    assert (
+        len(naive.collapse(F, 0, 1)) == topology.duplicate_faces(naive.collapse(F, 0, 1)) + 1 == 2
+    )
     assert_only(outcomes(mesh, 0.2), KEPT_LINK)
 
 
@@ -283,9 +288,7 @@ def test_foldover_by_angle(degrees):
         W = V.copy()
         W[a] = W[b] = (V[a] + V[b]) / 2
         stays = [f for f in naive.tuples(F) if (a in f) != (b in f)]
-        worst = max(
-            naive.angle(np.zeros(3), naive.normal(V, f), naive.normal(W, f)) for f in stays
-        )
+        worst = max(naive.angle(np.zeros(3), naive.normal(V, f), naive.normal(W, f)) for f in stays)
         mesh = built(V, F)
         short = 1.0001 * np.linalg.norm(V[a] - V[b])
         tally = outcomes(mesh, short, foldover_cosine=np.cos(np.radians(degrees)))

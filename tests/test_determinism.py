@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import remeshvec
 import zoo
+from structure import assert_same_bits, assert_valid, blocks_of, copied, locate, project
+
+import remeshvec
 from remeshvec._jit import driver
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.fit import fit_vertices
@@ -20,7 +22,6 @@ from remeshvec.operations.relax import RelaxOptions, relax_vertices
 from remeshvec.operations.split import compact, split_long_edges
 from remeshvec.operations.untangle import untangle_vertices
 from remeshvec.prepare import build_reference, prepare
-from structure import assert_same_bits, assert_valid, blocks_of, copied, locate, project
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -59,7 +60,10 @@ def test_every_driver_is_the_same_in_both_builds(monkeypatch):
     both = [prepare(V, F, parallel) for parallel in (False, True)]
     assert_same_bits(both[0].mesh, both[1].mesh)
     L = 1.3 * zoo.mean_edge(V, F) * both[0].scale
-    references = [build_reference(p.mesh, L, parallel) for p, parallel in zip(both, (False, True), strict=True)]
+    references = [
+        build_reference(p.mesh, L, parallel)
+        for p, parallel in zip(both, (False, True), strict=True)
+    ]
     same(tuple(references[0]), tuple(references[1]))
     current, reference = both[0].mesh, references[0]
     for _ in range(2):
@@ -174,7 +178,10 @@ def test_repeated_calls_and_other_calls_between():
     one = remeshvec.remesh(V, F, 0.2)
     remeshvec.remesh(*zoo.torus(), 0.1)
     two = remeshvec.remesh(V, F, 0.2)
-    same((one.V, one.F, one.birth_face, one.birth_barycentric), (two.V, two.F, two.birth_face, two.birth_barycentric))
+    same(
+        (one.V, one.F, one.birth_face, one.birth_barycentric),
+        (two.V, two.F, two.birth_face, two.birth_barycentric),
+    )
 
 
 def test_concurrent_calls_give_the_same_bits(monkeypatch):

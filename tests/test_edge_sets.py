@@ -4,11 +4,12 @@ import naive
 import numpy as np
 import pytest
 import zoo
+from structure import assert_same_bits, blocks_of, built, copied, half_edge, tree_of
+
 from remeshvec import edge_sets
 from remeshvec._types import Blocks
 from remeshvec.edge_sets import OWNED, REST, SHIFTED, list_range, stage_blocks, vertex_range
 from remeshvec.operations import collapse, flip, untangle
-from structure import assert_same_bits, blocks_of, built, copied, half_edge, tree_of
 
 
 @pytest.mark.parametrize("per_block", [4, 17, 50, 10_000])
@@ -18,13 +19,20 @@ def test_blocks_partition_the_mesh(name, per_block, monkeypatch):
     blocks = blocks_of(mesh, per_block, monkeypatch)
     for ends, size in ((blocks.face, mesh.origin.size // 3), (blocks.vertex, len(mesh.X))):
         assert ends[0] == 0 and ends[-1] == size and (np.diff(ends) >= 0).all()
-    assert len(blocks.face) == len(blocks.vertex) == max(1, round(len(mesh.origin) / 3 / per_block)) + 1
+    assert (
+        len(blocks.face)
+        == len(blocks.vertex)
+        == max(1, round(len(mesh.origin) / 3 / per_block)) + 1
+    )
 
 
 def test_small_meshes_are_one_block_and_big_ones_many():
     assert len(edge_sets.make_blocks(built(*zoo.torus())).face) == 2
     mesh = built(*zoo.grid(150, 150), ordered=True)
-    assert len(edge_sets.make_blocks(mesh).face) == round(149 * 149 * 2 / edge_sets.FACES_PER_BLOCK) + 1
+    assert (
+        len(edge_sets.make_blocks(mesh).face)
+        == round(149 * 149 * 2 / edge_sets.FACES_PER_BLOCK) + 1
+    )
     assert len(edge_sets.stages(edge_sets.make_blocks(mesh))) == 3
 
 
@@ -58,7 +66,7 @@ def test_morton_blocks_own_most_edges(monkeypatch):
     blocks = blocks_of(mesh, 1024, monkeypatch)
     block = np.searchsorted(blocks.vertex, np.arange(len(mesh.X)), side="right")
     F = block[mesh.origin.reshape(-1, 3)]
-    assert (F == F[:, :1]).all(axis=1).mean() > 0.75
+    assert (F[:, :1] == F).all(axis=1).mean() > 0.75
 
 
 # --- footprints ----------------------------------------------------------------------------------
@@ -120,7 +128,9 @@ def test_a_flip_owns_the_four_vertices_of_its_quad(outside):
     before = copied(mesh)
     h = half_edge(mesh, new[0], new[1])
     for side in (h, int(mesh.twin[h])):
-        done = run_owned(flip._flip, mesh, all_but_the_last_vertex(mesh), FLIPS, side, flip.N_OUTCOMES)
+        done = run_owned(
+            flip._flip, mesh, all_but_the_last_vertex(mesh), FLIPS, side, flip.N_OUTCOMES
+        )
         assert not done
         assert_same_bits(mesh, before)
 

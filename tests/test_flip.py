@@ -4,6 +4,18 @@ import naive
 import numpy as np
 import pytest
 import zoo
+from structure import (
+    assert_same_bits,
+    assert_valid,
+    blocks_of,
+    built,
+    copied,
+    faces_of,
+    half_edge,
+    one_block,
+    shape_of,
+)
+
 from remeshvec._types import NONE, Blocks
 from remeshvec.operations.flip import (
     FLIPPED,
@@ -18,17 +30,6 @@ from remeshvec.operations.flip import (
     flip_edges,
     valence_gain,
     violates_delaunay,
-)
-from structure import (
-    assert_same_bits,
-    assert_valid,
-    blocks_of,
-    built,
-    copied,
-    faces_of,
-    half_edge,
-    one_block,
-    shape_of,
 )
 
 LOOSE = FlipLimits(normal_cosine=0.0, delaunay_ties=False, sliver_check=False)
@@ -71,7 +72,11 @@ def test_vertices_of_three_edges_lose_none():
 @pytest.mark.parametrize("name", ["torus", "planar_delaunay", "icosphere", "annulus"])
 def test_each_single_flip_is_that_of_the_twin(name):
     V, F = zoo.ZOO[name].make()
-    edges = [e for e in sorted(map(sorted, naive.edges(F))) if frozenset(e) not in naive.boundary_edges(F)]
+    edges = [
+        e
+        for e in sorted(map(sorted, naive.edges(F)))
+        if frozenset(e) not in naive.boundary_edges(F)
+    ]
     flipped = 0
     for a, b in edges[:40]:
         mesh = built(V, F)

@@ -5,9 +5,10 @@ import naive
 import numpy as np
 import pytest
 import zoo
+from structure import built
+
 from remeshvec import geometry
 from remeshvec.operations import flip
-from structure import built
 
 RNG = np.random.default_rng(5)
 TRIANGLES = RNG.normal(size=(60, 3, 3))
@@ -49,7 +50,7 @@ def test_mean_ratio_knows_its_extremes():
     assert geometry.mean_ratio(0.0, 0.0, 0.0, 0.0) == 0
     assert geometry.mean_ratio(1.0, 1.0, 2.0, 1.0) == pytest.approx(np.sqrt(3) / 2)
     ratios = [geometry.mean_ratio(*squared_edges(T)) for T in TRIANGLES]
-    assert 0 < min(ratios) and max(ratios) < 1
+    assert min(ratios) > 0 and max(ratios) < 1
 
 
 def test_mixed_voronoi_areas_add_up_and_agree_with_libigl():
@@ -125,7 +126,11 @@ def test_closest_on_a_needle_misses_by_no_more_than_rounding(height):
 
 
 def test_closest_on_a_triangle_without_area():
-    for T in ([[0, 0, 0]] * 3, [[0, 0, 0], [1, 0, 0], [0, 0, 0]], [[0, 0, 0], [1, 0, 0], [3, 0, 0]]):
+    for T in (
+        [[0, 0, 0]] * 3,
+        [[0, 0, 0], [1, 0, 0], [0, 0, 0]],
+        [[0, 0, 0], [1, 0, 0], [3, 0, 0]],
+    ):
         T = np.array(T, dtype=float)
         for p in RNG.normal(scale=2, size=(50, 3)):
             s, t, squared = geometry.closest_on_triangle(*p, *T.ravel())

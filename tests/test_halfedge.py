@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 import topology
 import zoo
+from structure import assert_same_bits, assert_valid, built, copied, faces_of, half_edge, walk
+
 from remeshvec._types import BOUNDARY, DEAD, FIXED, INNER, NONE
 from remeshvec.edge_sets import make_blocks
 from remeshvec.halfedge import build_mesh, following, previous
 from remeshvec.operations.split import compact
 from remeshvec.order import order_mesh
-from structure import assert_same_bits, assert_valid, built, copied, faces_of, half_edge, walk
 
 TINY = ["triangle", "square", "tetrahedron", "octahedron", "sliver_fan"]
 
@@ -117,7 +118,12 @@ def test_inconsistent_then_third_face_counts_once():
 
 def test_many_faces_on_one_edge_do_not_hang():
     n = 200
-    V = np.vstack([[[0, 0, 0], [0, 0, 1]], np.column_stack([np.cos(zoo.turn(n)), np.sin(zoo.turn(n)), 0 * zoo.turn(n)])])
+    V = np.vstack(
+        [
+            [[0, 0, 0], [0, 0, 1]],
+            np.column_stack([np.cos(zoo.turn(n)), np.sin(zoo.turn(n)), 0 * zoo.turn(n)]),
+        ]
+    )
     F = np.array([[0, 1, k + 2] if k % 2 else [1, 0, k + 2] for k in range(n)])
     mesh, found, _ = build_dirty(V, F)
     assert found.non_manifold_edges == 1

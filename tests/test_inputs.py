@@ -4,8 +4,9 @@ import warnings
 
 import numpy as np
 import pytest
-import remeshvec
 import zoo
+
+import remeshvec
 from remeshvec import MeshInputError, OptionError, RemeshvecError, remesh
 
 SQUARE = zoo.square()
@@ -75,7 +76,8 @@ def test_bad_meshes_are_refused_in_one_line(V, F, message):
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
-    "L", [0, 0.0, -1, -1e-9, np.nan, np.inf, -np.inf, "1", "long", [1.0], 1j, True, (), 1e-300, 1e-160]
+    "L",
+    [0, 0.0, -1, -1e-9, np.nan, np.inf, -np.inf, "1", "long", [1.0], 1j, True, (), 1e-300, 1e-160],
 )
 def test_bad_lengths(L):
     with pytest.raises(OptionError, match=r"^L "):
@@ -84,7 +86,9 @@ def test_bad_lengths(L):
 
 @pytest.mark.filterwarnings("error")
 def test_too_short_a_length_is_refused_at_once():
-    with pytest.raises(OptionError, match=r"faces, more than max_faces = 50,000,000; the mean edge"):
+    with pytest.raises(
+        OptionError, match=r"faces, more than max_faces = 50,000,000; the mean edge"
+    ):
         remesh(*SQUARE, 1e-5)
     with pytest.raises(OptionError, match="max_faces = 10"):
         remesh(*SQUARE, 0.1, max_faces=10)
@@ -105,7 +109,14 @@ def test_lengths_beyond_the_mesh_are_fine(L):
 
 @pytest.mark.parametrize(
     "changes",
-    [{"preset": "best"}, {"iterations": 0}, {"threads": 0}, {"collapse": 2}, {"callback": 3}, {"foldover": 180}],
+    [
+        {"preset": "best"},
+        {"iterations": 0},
+        {"threads": 0},
+        {"collapse": 2},
+        {"callback": 3},
+        {"foldover": 180},
+    ],
 )
 def test_bad_options_are_refused(changes):
     with pytest.raises(OptionError, match=next(iter(changes))):
@@ -194,7 +205,9 @@ def test_float_dtypes_come_back(dtype):
     assert np.array_equal(result.V, same.V.astype(dtype))
 
 
-@pytest.mark.parametrize("dtype", [np.int8, np.int16, np.int32, np.int64, np.uint8, np.uint32, np.uint64])
+@pytest.mark.parametrize(
+    "dtype", [np.int8, np.int16, np.int32, np.int64, np.uint8, np.uint32, np.uint64]
+)
 def test_face_dtypes_come_back(dtype):
     V, F = zoo.icosphere(1)
     assert remesh(V, F.astype(dtype), 0.5).F.dtype == dtype
@@ -216,7 +229,9 @@ def test_integer_coordinates_give_float64():
     assert np.array_equal(result.V, remesh(V, F, 0.4).V)
 
 
-@pytest.mark.parametrize("name", ["torus", "grid", "three_half_discs", "unreferenced_vertices", "coincident_vertices"])
+@pytest.mark.parametrize(
+    "name", ["torus", "grid", "three_half_discs", "unreferenced_vertices", "coincident_vertices"]
+)
 @pytest.mark.parametrize("preset", ["fast", "default", "fine"])
 def test_inputs_are_never_modified(name, preset):
     V, F = zoo.ZOO[name].make()

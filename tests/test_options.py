@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+
 from remeshvec import OptionError
 from remeshvec._jit import available_threads
 from remeshvec.options import PRESETS, make_options

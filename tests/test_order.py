@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import zoo
+
 from remeshvec.order import order_mesh
 
 
@@ -10,7 +11,7 @@ def ordered(V, F, parallel=False):
     return order_mesh(np.asarray(V, float), np.asarray(F, np.int32), parallel)
 
 
-@pytest.mark.parametrize("name", zoo.TIDY + ["unreferenced_vertices"])
+@pytest.mark.parametrize("name", [*zoo.TIDY, "unreferenced_vertices"])
 def test_it_is_a_permutation(name):
     V, F = zoo.ZOO[name].make()
     result = ordered(V, F)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 import zoo
+from structure import assert_valid, faces_of, shape_of
+
 from remeshvec import MeshInputError, OptionError
 from remeshvec._types import FIXED, NONE
 from remeshvec.clean import drop_degenerate_faces, drop_duplicate_faces, weld_vertices
 from remeshvec.prepare import build_reference, choose_length, prepare
-from structure import assert_valid, faces_of, shape_of
 
 
 def prepared(V, F):
@@ -136,7 +137,9 @@ def test_the_frame_has_an_extent_of_one_to_two(factor):
     assert 1 <= extent < 2
     assert np.log2(result.scale) % 1 == 0
     assert not result.centre.any()
-    assert np.array_equal(in_input_frame(result)[faces_of(result.mesh)], (V * factor)[F[result.face_source]])
+    assert np.array_equal(
+        in_input_frame(result)[faces_of(result.mesh)], (V * factor)[F[result.face_source]]
+    )
 
 
 def test_far_from_the_origin_the_frame_is_centred():
@@ -180,7 +183,9 @@ def test_default_length_is_nine_tenths_of_the_mean_edge(name):
 
 def test_too_many_faces_are_refused_with_the_numbers():
     result = prepared(*zoo.grid())  # area 24
-    with pytest.raises(OptionError, match=r"L = 0.001 .* 5.54e\+07 faces.*max_faces = 1,000.*mean edge"):
+    with pytest.raises(
+        OptionError, match=r"L = 0.001 .* 5.54e\+07 faces.*max_faces = 1,000.*mean edge"
+    ):
         choose_length(result, 1e-3, 1000)
     length = choose_length(result, 1.0, 56)  # 24 / (sqrt(3) / 4) = 55.4
     assert length == result.scale

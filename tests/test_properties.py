@@ -5,6 +5,8 @@ import pytest
 import zoo
 from hypothesis import example, given
 from hypothesis import strategies as st
+from structure import assert_valid, faces_of, locate, project, shape_of
+
 from remeshvec import remesh
 from remeshvec.edge_sets import make_blocks
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
@@ -14,7 +16,6 @@ from remeshvec.operations.relax import RelaxOptions, relax_vertices
 from remeshvec.operations.split import compact, split_long_edges
 from remeshvec.operations.untangle import untangle_vertices
 from remeshvec.prepare import build_reference, prepare
-from structure import assert_valid, faces_of, locate, project, shape_of
 
 MESHES = st.fixed_dictionaries(
     {
@@ -67,7 +68,7 @@ class Phases:
                 assert shape_of(faces_of(self.mesh)) == self.shape
             size = len(self.reference.origin)
             used = self.mesh.vertex_halfedge >= 0
-            assert 0 <= self.mesh.birth[used].min() and self.mesh.birth[used].max() < size
+            assert self.mesh.birth[used].min() >= 0 and self.mesh.birth[used].max() < size
         except AssertionError as error:
             raise AssertionError(f"after {phase}: {error}") from error
 

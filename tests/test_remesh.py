@@ -6,8 +6,9 @@ import igl
 import numpy as np
 import pytest
 import zoo
-from remeshvec import remesh
 from structure import shape_of
+
+from remeshvec import remesh
 
 PRESETS = ["fast", "default", "fine"]
 
@@ -26,7 +27,7 @@ def assert_births(result, V, F):
     n = len(result.V)
     assert result.birth_face.shape == (n,) and result.birth_face.dtype == np.int64
     assert result.birth_barycentric.shape == (n, 3)
-    assert 0 <= result.birth_face.min() and result.birth_face.max() < len(F)
+    assert result.birth_face.min() >= 0 and result.birth_face.max() < len(F)
     assert result.birth_barycentric.min() >= -1e-12
     assert result.birth_barycentric.sum(axis=1) == pytest.approx(1, abs=1e-12)
     size = np.abs(V[np.unique(F)]).max()
@@ -333,7 +334,9 @@ def test_cow_and_its_pinched_vertex():
 def test_samples_keep_their_topology(name):
     V, F = zoo.sample(name)
     result = remesh(V, F)
-    assert igl.euler_characteristic(result.F.astype(np.int64)) == igl.euler_characteristic(F.astype(np.int64))
+    assert igl.euler_characteristic(result.F.astype(np.int64)) == igl.euler_characteristic(
+        F.astype(np.int64)
+    )
     assert_manifold(result.F)
     if name == "wolf_head.obj":
         assert len(zoo.boundary_loops(result.F)) == len(zoo.boundary_loops(F)) > 0
@@ -341,7 +344,9 @@ def test_samples_keep_their_topology(name):
     assert result.report.quality_after.min_angle > 20
 
 
-@pytest.mark.parametrize("name", ["bracket.obj", "wavy_sheet.obj", "pretzel.off", "linked_rings.off", "thin_sheet.obj"])
+@pytest.mark.parametrize(
+    "name", ["bracket.obj", "wavy_sheet.obj", "pretzel.off", "linked_rings.off", "thin_sheet.obj"]
+)
 def test_own_data_keeps_its_topology(name):
     V, F = zoo.read(zoo.DATA / name)
     with warnings.catch_warnings():
