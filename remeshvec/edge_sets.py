@@ -53,10 +53,13 @@ def make_blocks(mesh: Mesh) -> Blocks:
     of the vertices then belongs to range k of the faces; what does not fit is left to later stages.
     """
     n_faces = mesh.origin.size // 3
+    n_vertices = mesh.vertex_halfedge.size
     count = max(1, round(n_faces / FACES_PER_BLOCK))
+    if count == 1:
+        return Blocks(np.array([0, n_faces]), np.array([0, n_vertices]))
     face = (np.arange(count + 1, dtype=np.int64) * n_faces) // count
     vertex = np.zeros(count + 1, np.int64)
-    vertex[count] = mesh.vertex_halfedge.size
+    vertex[count] = n_vertices
     for k in range(1, count):
         h = 3 * int(face[k])
         while h < mesh.origin.size and mesh.vertex_halfedge[mesh.origin[h]] != h:

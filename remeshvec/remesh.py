@@ -190,25 +190,41 @@ class _Run:
         return self.may_run and n_faces >= _PARALLEL_FACES
 
     def sweep_all(self, mesh: Mesh, reference: Reference, length: float) -> Mesh:
-        """Run all sweeps, or until the callback ends them or nothing changes any more."""
+        """Run all sweeps, or until the callback ends them."""
+        blocks = make_blocks(mesh)
         for sweep in range(self.options.iterations):
             self.sweeps.append({})
-            mesh = self._sweep(mesh, reference, length, sweep)
+            mesh, blocks = self._split(mesh, blocks, self.options.split[sweep] * length)
+            if not self._is_cancelled(sweep, "split"):
+                self._improve(mesh, blocks, reference, length, sweep)
             if self.stop == "cancelled":
                 break
         return mesh
 
-    def _sweep(self, mesh: Mesh, reference: Reference, length: float, sweep: int) -> Mesh:
+    def _split(self, mesh: Mesh, blocks: Blocks, longest: float) -> tuple[Mesh, Blocks]:
+        """Split by rounds until no edge is too long."""
+        count = 0
+        with self.watch.time("split"):
+            for _ in range(MAX_ROUNDS):
+                parallel = self.is_parallel(mesh.origin.size // 3)
+                mesh, n_split = split_long_edges(mesh, blocks, longest, parallel)
+                if not n_split:
+                    break
+                blocks = make_blocks(mesh)
+                count += n_split
+        self.sweeps[-1]["split"] = count
+        return mesh, blocks
+
+    def _improve(
+        self, mesh: Mesh, blocks: Blocks, reference: Reference, length: float, sweep: int
+    ) -> None:
+        """Run the phases that change the mesh in place."""
         options = self.options
-        longest = options.split[sweep] * length
         left = options.iterations - sweep
-        mesh, blocks = self._split(mesh, longest)
         parallel = self.is_parallel(mesh.origin.size // 3)
-        if self._is_cancelled(sweep, "split"):
-            return mesh
         limits = CollapseLimits(
             options.collapse[sweep] * length,
-            longest,
+            options.split[sweep] * length,
             options.foldover_cosine,
             options.quadric_reach * length,
             options.sliver_check,
@@ -217,7 +233,7 @@ class _Run:
             tally = collapse_short_edges(mesh, blocks, limits, parallel)
             self.sweeps[-1]["collapse"] = int(tally[0])
         if self._is_cancelled(sweep, "collapse"):
-            return mesh
+            return
         flips = FlipLimits(
             cos(radians(options.flip_normal)), options.delaunay_ties, options.sliver_check
         )
@@ -226,7 +242,7 @@ class _Run:
                 tally = flip_edges(mesh, blocks, flips, parallel)
                 self.sweeps[-1]["flip"] = self.sweeps[-1].get("flip", 0) + int(tally[0])
         if self._is_cancelled(sweep, "flip"):
-            return mesh
+            return
         relax = RelaxOptions(options.angle_normals, options.stiffness, options.project)
         with self.watch.time("relax"):
             for _ in range(options.last_relaxations if left == 1 else 1):
@@ -237,22 +253,6 @@ class _Run:
             elif options.project:
                 project_boundary(mesh, blocks, reference, parallel)
         self._is_cancelled(sweep, "relax")
-        return mesh
-
-    def _split(self, mesh: Mesh, longest: float) -> tuple[Mesh, Blocks]:
-        """Split by rounds until no edge is too long."""
-        count = 0
-        with self.watch.time("split"):
-            for _ in range(MAX_ROUNDS):
-                blocks = make_blocks(mesh)
-                mesh, n_split = split_long_edges(
-                    mesh, blocks, longest, self.is_parallel(mesh.origin.size // 3)
-                )
-                if not n_split:
-                    break
-                count += n_split
-        self.sweeps[-1]["split"] = count
-        return mesh, blocks
 
     def finish(self, mesh: Mesh, reference: Reference, length: float) -> tuple[Mesh, FloatArray]:
         """Untangle, fit, and find where on the input every vertex lies."""
@@ -271,7 +271,8 @@ class _Run:
             for _ in range(options.fit_rounds):
                 fit_vertices(mesh, blocks, reference.tree, 0.2 * length, parallel)
         with self.watch.time("locate"):
-            trust = np.inf if options.project and not options.fit_rounds else 0.0
+            is_on_input = options.project and not options.fit_rounds
+            trust = np.inf if is_on_input else _TRUST * length
             barycentric = locate_vertices(mesh, blocks, reference, trust, parallel)
         return mesh, barycentric
 

@@ -1,4 +1,4 @@
-"""Collapses: each guard refuses where a weaker one would break the mesh, and what goes through is right."""
+"""Collapses: each guard refuses where a weaker one would break the mesh, the rest is done right."""
 
 import naive
 import numpy as np

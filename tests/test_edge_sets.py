@@ -1,5 +1,7 @@
 """Conflict-free sets: disjoint ranges, every candidate's turn comes, footprints are owned whole."""
 
+from itertools import pairwise
+
 import naive
 import numpy as np
 import pytest
@@ -45,7 +47,7 @@ def test_ranges_of_a_stage_are_disjoint(stage):
     blocks = Blocks(np.arange(0, 60, 10), np.array([0, 3, 9, 9, 20, 31]))
     ranges = [vertex_range(blocks, stage, k) for k in range(stage_blocks(blocks, stage))]
     assert all(low <= high for low, high in ranges)
-    assert all(one[1] <= two[0] for one, two in zip(ranges, ranges[1:], strict=False))
+    assert all(one[1] <= two[0] for one, two in pairwise(ranges))
     if stage == OWNED:
         assert ranges[0][0] == 0 and ranges[-1][1] == 31
     lists = [range(*list_range(blocks, stage, k)) for k in range(stage_blocks(blocks, stage))]

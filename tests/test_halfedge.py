@@ -93,7 +93,7 @@ def test_dirty_meshes_become_oriented_manifolds(name):
 
 def test_an_edge_of_three_faces_is_cut_and_fixed():
     V, F = zoo.three_half_discs()
-    mesh, found, ordered = build_dirty(V, F)
+    mesh, found, _ = build_dirty(V, F)
     assert found.non_manifold_edges == 2 and found.inconsistent_edges == 0
     on_line = np.abs(mesh.X[:, 1:3]).max(axis=1) == 0
     assert on_line.sum() == 9  # three vertices, each once a sheet

@@ -144,7 +144,7 @@ def test_the_frame_has_an_extent_of_one_to_two(factor):
 
 def test_far_from_the_origin_the_frame_is_centred():
     V, F = zoo.torus()
-    result = prepared(V + [1e6, 0, -1e6], F)
+    result = prepared(zoo.translate(V, (1e6, 0, -1e6)), F)
     assert np.abs(result.mesh.X[:, :3]).max() < 2
     assert result.centre == pytest.approx([1e6, 0, -1e6], abs=2)
 

@@ -253,22 +253,32 @@ def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, origin, tw
                 ids[i] = new_vertex[mesh.origin[h]]
                 if (m >> i) & 1:
                     ids[3 + i] = middle[max(h, np.int64(mesh.twin[h]))]
+            if m == 0:  # most faces: a copy
+                origin[base], origin[base + 1], origin[base + 2] = ids[0], ids[1], ids[2]
+                for i in range(3):
+                    twin[base + i] = _part_of(mesh.twin[3 * f + i], 0, mask, first_child)
+                continue
             for j in range(3 * _COUNT[m]):
                 origin[base + j] = ids[_CORNER[m, j]]
                 twin[base + j] = base + _INNER[m, j] if _INNER[m, j] >= 0 else NONE
             for i in range(3):
-                t = np.int64(mesh.twin[3 * f + i])
-                if t == NONE:
-                    continue
-                g = t // 3
-                j = 2 * (t - 3 * g)
-                other = np.int64(mask[g])
-                other_base = 3 * np.int64(first_child[g])
-                if (m >> i) & 1:
-                    twin[base + _PART[m, 2 * i]] = other_base + _PART[other, j + 1]
-                    twin[base + _PART[m, 2 * i + 1]] = other_base + _PART[other, j]
-                else:
-                    twin[base + _PART[m, 2 * i]] = other_base + _PART[other, j]
+                # Halves meet crosswise: the first of this side lies on the second of the other.
+                half = (m >> i) & 1
+                t = mesh.twin[3 * f + i]
+                twin[base + _PART[m, 2 * i]] = _part_of(t, half, mask, first_child)
+                if half:
+                    twin[base + _PART[m, 2 * i + 1]] = _part_of(t, 0, mask, first_child)
+
+
+@inlined
+def _part_of(h, half, mask, first_child):
+    """Place in the refined mesh of a half-edge, or of its second half."""
+    if h == NONE:
+        return np.int64(NONE)
+    f = np.int64(h) // 3
+    i = np.int64(h) - 3 * f
+    m = np.int64(mask[f])
+    return 3 * np.int64(first_child[f]) + (i if m == 0 else _PART[m, 2 * i + half])
 
 
 @driver
