@@ -112,7 +112,8 @@ class RemeshResult:
         Input face on which each vertex lies.
     birth_barycentric : (n, 3) float64
         Where on it: ``V = sum(birth_barycentric[:, i] * V_in[F_in[birth_face, i]])`` for vertices
-        that lie on the input, the closest point to them otherwise.
+        that lie on the input; otherwise that is the point of the input closest to the vertex, among
+        those that a walk over the input sees where it ends within 0.05 L.
     report : Report
     """
 
