@@ -1,5 +1,5 @@
 """``python -m remeshvec`` is the shell command."""
 
-from remeshvec.cli import main
+from .cli import main
 
 raise SystemExit(main())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from remeshvec import __version__
+from . import __version__
 
 __all__ = ["DEFAULT_FACTOR", "parser"]
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from remeshvec._file_guards import MeshCopy, check_room, off_copy, text_lines
+from ._file_guards import MeshCopy, check_room, off_copy, text_lines
 
 __all__ = ["PlyHeader", "check_ply", "parse_header"]
 

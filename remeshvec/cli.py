@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import remeshvec
-from remeshvec._arguments import DEFAULT_FACTOR, parser
-from remeshvec.errors import OptionError, RemeshvecError
-from remeshvec.mesh_files import (
+
+from ._arguments import DEFAULT_FACTOR, parser
+from .errors import OptionError, RemeshvecError
+from .mesh_files import (
     SUFFIXES,
     MeshFile,
     check_writable,
@@ -24,8 +25,8 @@ from remeshvec.mesh_files import (
     write_file,
     write_mesh,
 )
-from remeshvec.quality import quality, side_by_side
-from remeshvec.report import RemeshResult
+from .quality import quality, side_by_side
+from .report import RemeshResult
 
 __all__ = ["main"]
 
@@ -88,7 +89,7 @@ def _run(options: argparse.Namespace) -> None:
     if not options.quiet:
         _print_report(options, mesh, result, seconds)
     if options.visualize:
-        from remeshvec import viz
+        from . import viz
 
         viz.show((mesh.V, mesh.F), (result.V, result.F), up=options.up)
 
@@ -100,7 +101,7 @@ def _check_outputs(options: argparse.Namespace) -> None:
     if options.save_stats:
         check_writable(options.save_stats)
     if options.picture or options.visualize:
-        from remeshvec import viz
+        from . import viz
 
         viz.require_viewer(window=options.visualize)
         if options.picture:
@@ -185,7 +186,7 @@ def _progress(quiet: bool) -> Iterator[Progress | None]:
 
 
 def _make_picture(options: argparse.Namespace, mesh: MeshFile, result: RemeshResult) -> None:
-    from remeshvec import viz
+    from . import viz
 
     viz.picture(options.picture, (mesh.V, mesh.F), (result.V, result.F), up=options.up)
 

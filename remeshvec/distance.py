@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from remeshvec.errors import OptionError
-from remeshvec.quality import _as_mesh as as_mesh
+from ._check import as_mesh
+from .errors import OptionError
 
 __all__ = ["SurfaceDistance", "surface_distance"]
 

@@ -19,10 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from remeshvec._file_guards import MeshCopy, check_obj, check_off, check_stl, checked_bytes
-from remeshvec._mesh_writers import WRITERS
-from remeshvec._ply_guard import check_ply, parse_header
-from remeshvec.errors import MeshFormatError
+from ._file_guards import MeshCopy, check_obj, check_off, check_stl, checked_bytes
+from ._mesh_writers import WRITERS
+from ._ply_guard import check_ply, parse_header
+from .errors import MeshFormatError
 
 __all__ = ["SUFFIXES", "MeshFile", "check_writable", "read_mesh", "write_file", "write_mesh"]
 

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from remeshvec.errors import MeshInputError, OptionError
+from ._check import as_mesh
+from .errors import OptionError
 
 __all__ = ["Quality", "quality", "side_by_side"]
 
@@ -149,7 +150,7 @@ def quality(V: ArrayLike, F: ArrayLike, L: float | None = None) -> Quality:
     """
     if L is not None and not (np.isfinite(L) and L > 0):
         raise OptionError(f"L must be a positive length, got {L!r}")
-    V, F = _as_mesh(V, F)
+    V, F = as_mesh(V, F)
     repeated = (F[:, 0] == F[:, 1]) | (F[:, 1] == F[:, 2]) | (F[:, 2] == F[:, 0])
     used, F = _referenced(F[~repeated], len(V))
     X, unit = _unit_box(V[used])
@@ -199,20 +200,6 @@ class _Edges(NamedTuple):
     boundary: IntArray  # half-edges that are alone on their edge
     pairs: IntArray  # (p, 2), half-edges that share an edge with two faces
     neighbours: IntArray  # (q, 2), half-edges that follow each other on any edge
-
-
-def _as_mesh(V: ArrayLike, F: ArrayLike) -> tuple[FloatArray, IntArray]:
-    """Cast to float64 and int64 and check that this can be a triangle mesh."""
-    vertices, faces = np.asarray(V, dtype=np.float64), np.asarray(F)
-    if vertices.ndim != 2 or vertices.shape[1] != 3:
-        raise MeshInputError(f"V must have shape (n, 3), got {vertices.shape}")
-    if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
-        raise MeshInputError(f"F must have shape (m, 3) with m > 0, got {faces.shape}")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise MeshInputError(f"F must index the {len(vertices)} vertices")
-    if not np.isfinite(vertices).all():
-        raise MeshInputError("V has entries that are not finite")
-    return vertices, faces.astype(np.int64)
 
 
 def _percent(share: float) -> str:

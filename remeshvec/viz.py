@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from remeshvec.errors import RemeshvecError
-from remeshvec.mesh_files import check_writable, write_file
+from .errors import RemeshvecError
+from .mesh_files import check_writable, write_file
 
 __all__ = ["PICTURE_SUFFIXES", "ViewerMissingError", "picture", "require_viewer", "show"]
 

@@ -65,6 +65,17 @@ def test_a_circle_has_no_corners(n, length):
     assert len(corners_of(V, F, length)) == 0
 
 
+@pytest.mark.parametrize("length", [0.3, 1.9, 2.5])
+def test_arcs_that_go_on_turning_are_no_corners(length):
+    """Half-circles of radius 1 at the ends of a long strip: over L / 2 they turn by up to 72 degrees."""
+    t = np.linspace(-np.pi / 2, np.pi / 2, 41)
+    end = np.stack([10 + np.cos(t), np.sin(t)], axis=1)
+    side = np.stack([np.linspace(-9.9, 9.9, 200), np.full(200, -1.0)], axis=1)
+    rim = np.vstack([side, end, -side, -end])
+    V = np.vstack([np.column_stack([rim, np.zeros(len(rim))]), [[0, 0, 0]]])
+    assert len(corners_of(V, zoo.fan(np.arange(len(rim)), len(rim)), length)) == 0
+
+
 @pytest.mark.parametrize("length", [0.05, 0.3, 1.0, 2.0, 10.0])
 @pytest.mark.parametrize("spacing", [0.04, 0.5, 9.0])
 def test_a_rectangle_has_four(spacing, length):

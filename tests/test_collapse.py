@@ -17,7 +17,7 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import BOUNDARY, DEAD, FIXED
+from remeshvec._types import APEX, BOUNDARY, DEAD, FIXED, INNER
 from remeshvec.operations.collapse import (
     COLLAPSED,
     KEPT_BOUNDARY,
@@ -234,6 +234,24 @@ def test_two_fixed_vertices_stay_apart():
     assert_only(outcomes(mesh, 0.2), KEPT_BOUNDARY)
 
 
+@pytest.mark.parametrize("kind", [INNER, APEX, FIXED])
+def test_tips_stay_where_they_are(kind):
+    """A tip swallows inner vertices, and no other kind swallows a tip."""
+    V, F = zoo.grid()
+    a, b = inner_edge = next(
+        (a, b)
+        for a, b in map(sorted, naive.edges(F))
+        if not any({a, b} & edge for edge in naive.boundary_edges(F))
+    )
+    for tip, other in (inner_edge, inner_edge[::-1]):
+        mesh = built(pulled(V, a, b), F)
+        mesh.kind[tip], mesh.kind[other] = APEX, kind
+        place = mesh.X[tip].copy()
+        assert_only(outcomes(mesh, 0.2), COLLAPSED if kind == INNER else KEPT_BOUNDARY)
+        assert mesh.kind[tip] == APEX and np.array_equal(mesh.X[tip], place)
+        assert mesh.vertex_halfedge[tip] != DEAD
+
+
 def test_overshoot():
     """The edge is short and its ends' edges are not too long, but those of the midpoint would be."""
     V, F = zoo.grid()
@@ -330,6 +348,24 @@ def test_sliver_check_is_an_option():
 def shape(V, f):
     lengths = [((V[f[i]] - V[f[i - 1]]) ** 2).sum() for i in range(3)]
     return 2 * np.sqrt(3) * np.linalg.norm(naive.normal(V, f)) / sum(lengths)
+
+
+def test_sliver_check_compares_the_worst_before_and_after():
+    V, F = zoo.perturb(*zoo.icosphere(1), amount=0.15)
+    seen = set()
+    for a, b in sorted(map(sorted, naive.edges(F))):
+        W = pulled(V, a, b, 0.2)
+        W[a] += 1e-9  # no ties
+        after = W.copy()
+        after[a] = after[b] = (W[a] + W[b]) / 2
+        around = [f for f in naive.tuples(F) if a in f or b in f]
+        stays = [f for f in around if not {a, b} <= set(f)]
+        worse = min(shape(after, f) for f in stays) < min(shape(W, f) for f in around)
+        tally = outcomes(built(W, F), 0.21, sliver_check=True)
+        if tally[KEPT_SLIVER] + tally[COLLAPSED] == 1:
+            assert bool(tally[KEPT_SLIVER]) == worse
+            seen.add(worse)
+    assert seen == {False, True}
 
 
 @pytest.mark.parametrize("name", ["torus", "planar_delaunay", "icosphere"])

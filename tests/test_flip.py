@@ -60,6 +60,16 @@ def test_gain_and_delaunay_are_those_of_the_twins(name):
     assert len(gains) > 1 or name in ("torus", "annulus")
 
 
+@pytest.mark.parametrize("degrees", [60.0, 89.9, 90.1, 91.0, 120.0])
+def test_delaunay_by_angle(degrees):
+    """Both angles opposite the edge are known."""
+    y = 1 / np.tan(np.radians(degrees) / 2)
+    V = np.array([[-1, 0, 0], [1, 0, 0], [0, y, 0], [0, -y, 0]])
+    mesh = built(V, [[0, 1, 2], [1, 0, 3]])
+    h = half_edge(mesh, 0, 1)
+    assert violates_delaunay(mesh, h, int(mesh.twin[h])) == (degrees > 90)
+
+
 def test_vertices_of_three_edges_lose_none():
     """Without the floor the gain of this flip is positive, and a vertex of two edges remains."""
     V, F = zoo.tetrahedron()

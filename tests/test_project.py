@@ -7,7 +7,7 @@ import zoo
 from structure import assert_valid, built, copied, locate, one_block, project
 
 from remeshvec._types import APEX, BOUNDARY, FIXED, INNER
-from remeshvec.operations.project import project_boundary
+from remeshvec.operations.project import project_boundary, project_vertices
 from remeshvec.prepare import build_reference
 
 MESHES = ["icosphere", "torus", "genus_2", "planar_delaunay", "annulus", "grid", "two_components"]
@@ -111,3 +111,19 @@ def test_a_second_projection_changes_nothing_but_rounding():
     before = mesh.X.copy()
     project(mesh, reference)
     assert pytest.approx(before, abs=1e-14) == mesh.X
+
+
+@pytest.mark.parametrize(("trust", "finds_the_top"), [(0.0, True), (0.01, True), (0.1, False)])
+def test_trust_is_a_distance(trust, finds_the_top):
+    """On the top of a thin sheet, remembered on the bottom: a walk stays there, a search does not."""
+    V, F = zoo.thin_sheet(10, thickness=0.02)
+    mesh = built(V, F)
+    reference = build_reference(mesh, 1.0, False)
+    middle = V[F].mean(axis=1)
+    bottom = np.abs(middle - [4.5, 4.5, -0.02]).sum(axis=1).argmin()
+    v = next(v for v in range(len(V)) if V[v, 2] == 0 and mesh.kind[v] == INNER)
+    mesh.X[v, :3] = [4.4, 4.6, 0.0]
+    mesh.birth[v] = 3 * bottom
+    mesh.kind[np.arange(len(V)) != v] = FIXED
+    project_vertices(mesh, one_block(mesh), reference, trust, False)
+    assert mesh.X[v, :3] == pytest.approx([4.4, 4.6, 0.0 if finds_the_top else -0.02])
