@@ -132,6 +132,8 @@ def make_options(preset: str, overrides: dict[str, Any]) -> Options:
 
 def _schedule(name: str, given: Any, preset: Schedule, sweeps: int) -> Schedule:
     """One factor a sweep: a number is constant, a sequence is stretched over the sweeps."""
+    if given is None and len(preset) in (1, sweeps):
+        return preset * (sweeps // len(preset))
     values = preset if given is None else given
     if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str):
         values = (values,)

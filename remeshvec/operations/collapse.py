@@ -96,6 +96,7 @@ def _collapse(mesh, blocks, stage, limits, candidates, count, tally):
         first, end = list_range(blocks, stage, k)
         faces = np.empty((2, RING_CAPACITY), np.int64)
         ring = np.empty((2, RING_CAPACITY), np.int64)
+        normals = np.empty((2, RING_CAPACITY, 4))
         for j in range(first, end):
             for i in range(3 * blocks.face[j], 3 * blocks.face[j] + count[j]):
                 h = np.int64(candidates[i])
@@ -104,14 +105,14 @@ def _collapse(mesh, blocks, stage, limits, candidates, count, tally):
                 v = mesh.origin[h]
                 if v < low or v >= high:  # another block's, or DEAD
                     continue
-                outcome = _collapse_edge(mesh, h, low, high, limits, faces, ring)
+                outcome = _collapse_edge(mesh, h, low, high, limits, faces, ring, normals)
                 tally[k, outcome] += 1
                 if outcome != OUTSIDE:
                     candidates[i] = DONE
 
 
 @inlined
-def _collapse_edge(mesh, h, low, high, limits, faces, ring):
+def _collapse_edge(mesh, h, low, high, limits, faces, ring, normals):
     """Collapse one edge if every guard agrees; returns the outcome."""
     a = np.int64(mesh.origin[h])
     b = np.int64(mesh.origin[following(h)])
@@ -129,15 +130,19 @@ def _collapse_edge(mesh, h, low, high, limits, faces, ring):
         return KEPT_LINK
     if not keeps_link(mesh, h, ring[0], n_a, m_a, ring[1], n_b, m_b):
         return KEPT_LINK
-    x, y, z = _position(mesh, a, b, limits.quadric_reach, faces, n_a, n_b)
+    sharp_a = _measure_normals(mesh, faces[0], n_a, normals[0])
+    sharp_b = _measure_normals(mesh, faces[1], n_b, normals[1])
+    x, y, z = _position(
+        mesh, a, b, sharp_a, sharp_b, limits.quadric_reach, faces, n_a, n_b, normals
+    )
     limit = limits.longest * limits.longest
     if overshoots(mesh.X, x, y, z, b, ring[0], m_a, limit) or overshoots(
         mesh.X, x, y, z, a, ring[1], m_b, limit
     ):
         return KEPT_OVERSHOOT
     cosine = limits.foldover_cosine
-    if folds_over(mesh, x, y, z, b, faces[0], n_a, cosine) or folds_over(
-        mesh, x, y, z, a, faces[1], n_b, cosine
+    if folds_over(mesh, x, y, z, b, faces[0], n_a, normals[0], cosine) or folds_over(
+        mesh, x, y, z, a, faces[1], n_b, normals[1], cosine
     ):
         return KEPT_FOLDOVER
     if limits.sliver_check and makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
@@ -209,30 +214,11 @@ def keeps_link(mesh, h, ring_a, n_a, m_a, ring_b, n_b, m_b):
 
 
 @inlined
-def _position(mesh, a, b, reach, faces, n_a, n_b):
-    """Where the two ends meet: at the more constrained or sharper one, else midpoint or quadric."""
-    if mesh.kind[a] > mesh.kind[b]:
-        return mesh.X[a, 0], mesh.X[a, 1], mesh.X[a, 2]
-    if mesh.kind[b] > mesh.kind[a]:
-        return mesh.X[b, 0], mesh.X[b, 1], mesh.X[b, 2]
-    if mesh.kind[a] == INNER:
-        sharp_a = _is_sharp(mesh, faces[0], n_a)
-        sharp_b = _is_sharp(mesh, faces[1], n_b)
-        if sharp_a and not sharp_b:
-            return mesh.X[a, 0], mesh.X[a, 1], mesh.X[a, 2]
-        if sharp_b and not sharp_a:
-            return mesh.X[b, 0], mesh.X[b, 1], mesh.X[b, 2]
-    x = 0.5 * (mesh.X[a, 0] + mesh.X[b, 0])
-    y = 0.5 * (mesh.X[a, 1] + mesh.X[b, 1])
-    z = 0.5 * (mesh.X[a, 2] + mesh.X[b, 2])
-    if reach <= 0.0 or mesh.kind[a] != INNER:
-        return x, y, z
-    return _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b)
+def _measure_normals(mesh, faces, n, normals):
+    """Area vectors of a ring's faces and their lengths; tells whether the vertex is sharp.
 
-
-@inlined
-def _is_sharp(mesh, faces, n):
-    """Tell whether the normals around a vertex cancel, as on the rim of a sheet."""
+    Sharp: the normals cancel, as on the rim of a sheet.
+    """
     X = mesh.X
     sx = sy = sz = total = 0.0
     for i in range(n):
@@ -243,32 +229,47 @@ def _is_sharp(mesh, faces, n):
         nx, ny, nz = face_vector(
             X[u, 0], X[u, 1], X[u, 2], X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2]
         )
+        length = sqrt(nx * nx + ny * ny + nz * nz)
+        normals[i, 0], normals[i, 1], normals[i, 2], normals[i, 3] = nx, ny, nz, length
         sx += nx
         sy += ny
         sz += nz
-        total += sqrt(nx * nx + ny * ny + nz * nz)
+        total += length
     return sx * sx + sy * sy + sz * sz < SHARP * SHARP * total * total
 
 
 @inlined
-def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b):
+def _position(mesh, a, b, sharp_a, sharp_b, reach, faces, n_a, n_b, normals):
+    """Where the two ends meet: at the more constrained or sharper one, else midpoint or quadric."""
+    is_inner = mesh.kind[a] == INNER and mesh.kind[b] == INNER
+    if mesh.kind[a] > mesh.kind[b] or (is_inner and sharp_a and not sharp_b):
+        return mesh.X[a, 0], mesh.X[a, 1], mesh.X[a, 2]
+    if mesh.kind[b] > mesh.kind[a] or (is_inner and sharp_b and not sharp_a):
+        return mesh.X[b, 0], mesh.X[b, 1], mesh.X[b, 2]
+    x = 0.5 * (mesh.X[a, 0] + mesh.X[b, 0])
+    y = 0.5 * (mesh.X[a, 1] + mesh.X[b, 1])
+    z = 0.5 * (mesh.X[a, 2] + mesh.X[b, 2])
+    if reach <= 0.0 or not is_inner:
+        return x, y, z
+    return _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b, normals)
+
+
+@inlined
+def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b, normals):
     """Point closest to the planes of both rings, weighted by area [Garland and Heckbert 1997]."""
     xx = xy = xz = yy = yz = zz = gx = gy = gz = weight = 0.0
     X = mesh.X
     for side in range(2):
+        # All planes of a ring pass through its centre.
+        v = mesh.origin[faces[side, 0]]
+        dx, dy, dz = x - X[v, 0], y - X[v, 1], z - X[v, 2]
         for i in range(n_a if side == 0 else n_b):
-            h = faces[side, i]
-            u = mesh.origin[h]
-            v = mesh.origin[following(h)]
-            w = mesh.origin[previous(h)]
-            nx, ny, nz = face_vector(
-                X[u, 0], X[u, 1], X[u, 2], X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2]
-            )
-            norm = sqrt(nx * nx + ny * ny + nz * nz)
+            norm = normals[side, i, 3]
             if norm == 0.0:
                 continue
+            nx, ny, nz = normals[side, i, 0], normals[side, i, 1], normals[side, i, 2]
             weight += norm
-            height = (nx * (x - X[u, 0]) + ny * (y - X[u, 1]) + nz * (z - X[u, 2])) / norm
+            height = (nx * dx + ny * dy + nz * dz) / norm
             gx -= nx * height
             gy -= ny * height
             gz -= nz * height
@@ -315,24 +316,19 @@ def overshoots(X, x, y, z, other, ring, m, limit):
 
 
 @inlined
-def folds_over(mesh, x, y, z, other, faces, n, cosine):
+def folds_over(mesh, x, y, z, other, faces, n, normals, cosine):
     """Guard: a face that stays would turn its normal too far, or lose its area."""
     X = mesh.X
     for i in range(n):
-        h = faces[i]
-        u = mesh.origin[h]
-        v = mesh.origin[following(h)]
-        w = mesh.origin[previous(h)]
+        v = mesh.origin[following(faces[i])]
+        w = mesh.origin[previous(faces[i])]
         if v == other or w == other:
             continue
-        ox, oy, oz = face_vector(
-            X[u, 0], X[u, 1], X[u, 2], X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2]
-        )
         nx, ny, nz = face_vector(x, y, z, X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2])
-        if ox == 0.0 and oy == 0.0 and oz == 0.0:
+        if normals[i, 3] == 0.0:
             if nx == 0.0 and ny == 0.0 and nz == 0.0:
                 return True
-        elif turn_exceeds(ox, oy, oz, nx, ny, nz, cosine):
+        elif turn_exceeds(normals[i, 0], normals[i, 1], normals[i, 2], nx, ny, nz, cosine):
             return True
     return False
 

@@ -107,8 +107,8 @@ def _refine(mesh: Mesh, blocks: Blocks, asked: np.ndarray, parallel: bool) -> tu
     _mark_edges(parallel, mesh, blocks, asked, mask, sizes)
     starts = np.zeros_like(sizes)
     np.cumsum(sizes[:-1], axis=0, out=starts[1:])
-    n_faces = int(sizes[:, 0].sum())
-    n_vertices = int(sizes[:, 1].sum() + sizes[:, 2].sum())
+    n_faces, n_owned, n_split = sizes.sum(axis=0).tolist()
+    n_vertices = n_owned + n_split
     first_child = np.empty(mask.size, np.int32)
     new_vertex = np.empty(mesh.vertex_halfedge.size, np.int32)
     middle = np.empty(mesh.origin.size, np.int32)
@@ -125,7 +125,6 @@ def _refine(mesh: Mesh, blocks: Blocks, asked: np.ndarray, parallel: bool) -> tu
     numbers = (mask, first_child, new_vertex, middle)
     _write_faces(parallel, mesh, blocks, *numbers, refined.origin, refined.twin)
     _write_vertices(parallel, mesh, blocks, *numbers, *refined[2:])
-    n_split = int(sizes[:, 2].sum())
     if n_split:
         _update_valences(mesh, mask, new_vertex, middle, refined)
     return refined, n_split
