@@ -5,6 +5,7 @@
 
 from .distance import SurfaceDistance, surface_distance
 from .errors import MeshFormatError, MeshInputError, OptionError, RemeshvecError
+from .mesh_files import MeshFile, read_mesh, write_mesh
 from .quality import Quality, quality
 from .remesh import remesh
 from .report import RemeshResult, Report
@@ -12,6 +13,7 @@ from .report import RemeshResult, Report
 __version__ = "0.1.0"
 
 __all__ = [
+    "MeshFile",
     "MeshFormatError",
     "MeshInputError",
     "OptionError",
@@ -21,6 +23,8 @@ __all__ = [
     "Report",
     "SurfaceDistance",
     "quality",
+    "read_mesh",
     "remesh",
     "surface_distance",
+    "write_mesh",
 ]

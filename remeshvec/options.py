@@ -32,7 +32,6 @@ class Options:
     quadric_reach: float = 0.5  # how far a collapse may place its vertex from the midpoint
     delaunay_ties: bool = True
     flip_passes: int = 2
-    angle_normals: bool = False  # vertex normals for relaxing, by angle instead of by area
     stiffness: float = 60.0  # hold of curved ridges on their vertices while relaxing
     last_relaxations: int = 4  # relaxations in the last sweep, one before
     project: bool = True

@@ -243,7 +243,7 @@ class _Run:
                 self.sweeps[-1]["flip"] = self.sweeps[-1].get("flip", 0) + int(tally[0])
         if self._is_cancelled(sweep, "flip"):
             return
-        relax = RelaxOptions(options.angle_normals, options.stiffness, options.project)
+        relax = RelaxOptions(options.stiffness, options.project)
         with self.watch.time("relax"):
             for _ in range(options.last_relaxations if left == 1 else 1):
                 relax_vertices(mesh, blocks, relax, parallel)

@@ -183,7 +183,7 @@ def voronoi_areas(V, F) -> np.ndarray:
     return areas
 
 
-def relaxed(V, F, *, angle_weights=False, stiffness=0.0, slide=False) -> np.ndarray:
+def relaxed(V, F, *, stiffness=0.0, slide=False) -> np.ndarray:
     """Every vertex moved at once: ``p += (I - n n^T)(g - p)``, boundary vertices along the boundary."""
     ring, areas = neighbours(F), voronoi_areas(V, F)
     rim = boundary_edges(F)
@@ -195,7 +195,7 @@ def relaxed(V, F, *, angle_weights=False, stiffness=0.0, slide=False) -> np.ndar
                 result[v] += along_chord(V[v], *(V[w] for w in beside))
             continue
         g = sum(areas[w] * V[w] for w in around) / sum(areas[w] for w in around)
-        result[v] += tangential(V, F, v, g - V[v], angle_weights, stiffness)
+        result[v] += tangential(V, F, v, g - V[v], stiffness)
     return result
 
 
@@ -205,15 +205,12 @@ def along_chord(p, before, after) -> np.ndarray:
     return ((before + after) / 2 - p) @ chord * chord
 
 
-def tangential(V, F, v: int, step, angle_weights: bool, stiffness: float) -> np.ndarray:
+def tangential(V, F, v: int, step, stiffness: float) -> np.ndarray:
     around = [f for f in tuples(F) if v in f]
     vectors = [normal(V, f) for f in around]
     norms = [np.linalg.norm(n) for n in vectors]
-    weights = norms
-    if angle_weights:
-        weights = [angle(V[v], *(V[w] for w in f if w != v)) for f in around]
-    n = sum(w * u / s for w, u, s in zip(weights, vectors, norms, strict=True))
-    if np.linalg.norm(n) <= SHARP * sum(weights):  # no tangent plane: it stays
+    n = sum(vectors)
+    if np.linalg.norm(n) <= SHARP * sum(norms):  # no tangent plane: it stays
         return np.zeros(3)
     n = n / np.linalg.norm(n)
     flat = np.eye(3) - np.outer(n, n)

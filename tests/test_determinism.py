@@ -47,7 +47,7 @@ def phases(L):
     flips = FlipLimits(0.7, True, False)
     yield "flip", lambda m, b, r, p: flip_edges(m, b, flips, p)
     yield "collapse", lambda m, b, r, p: collapse_short_edges(m, b, collapses, p)
-    for relax in (RelaxOptions(False, 20.0, True), RelaxOptions(True, 0.0, False)):
+    for relax in (RelaxOptions(20.0, True), RelaxOptions(0.0, False)):
         yield "relax", lambda m, b, r, p, o=relax: relax_vertices(m, b, o, p)
     yield "project", lambda m, b, r, p: project(m, r, b, p)
     yield "untangle", lambda m, b, r, p: untangle_vertices(m, b, r.tree, True, 0.8, p)

@@ -34,7 +34,6 @@ OPTIONS = st.fixed_dictionaries(
         "sliver_check": st.booleans(),
         "flip_normal": st.floats(10.0, 89.0),
         "delaunay_ties": st.booleans(),
-        "angle_normals": st.booleans(),
         "stiffness": st.sampled_from([0.0, 20.0, 80.0]),
         "project": st.booleans(),
         "fit": st.booleans(),
@@ -102,7 +101,7 @@ class Phases:
 
     def relax(self):
         o = self.o
-        options = RelaxOptions(o["angle_normals"], o["stiffness"], o["project"])
+        options = RelaxOptions(o["stiffness"], o["project"])
         relax_vertices(self.mesh, self.blocks, options, False)
         self.check("relax")
         if o["project"]:
@@ -147,7 +146,7 @@ def test_every_shape_through_every_phase(name):
     """The whole zoo, in many blocks, badly shaken."""
     options = {
         "split": 4 / 3, "collapse": 0.8, "foldover": 60.0, "quadric_reach": 0.5, "sliver_check": False,
-        "flip_normal": 60.0, "delaunay_ties": True, "angle_normals": False, "stiffness": 20.0,
+        "flip_normal": 60.0, "delaunay_ties": True, "stiffness": 20.0,
         "project": True, "fit": True, "per_block": 24,
     }  # fmt: skip
     run({"name": name, "amount": 0.15, "seed": 1, "factor": 0.8}, options)

@@ -17,7 +17,7 @@ from numba import prange
 
 from .._jit import driver, inlined, kernel
 from .._types import BOUNDARY, DEAD, INNER, MAX_VALENCE, NONE, Blocks, Mesh
-from ..geometry import SHARP, corner_angles, face_vector, mixed_voronoi_areas, tangent_basis
+from ..geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
 from ..halfedge import following, previous
 
 __all__ = ["RelaxOptions", "relax_vertices"]
@@ -30,7 +30,6 @@ N_SUMS = 16
 class RelaxOptions(NamedTuple):
     """How vertices relax."""
 
-    angle_normals: bool  # vertex normals weighted by angle instead of by area
     stiffness: float  # 20: vertices on curved ridges stay; 0: off
     slide: bool  # boundary vertices move along the boundary
 
@@ -42,7 +41,7 @@ def relax_vertices(mesh: Mesh, blocks: Blocks, options: RelaxOptions, parallel: 
     count = np.zeros(len(blocks.face) - 1, np.int64)
     _sum_areas(parallel, mesh, blocks, mesh.X, across, count)
     _sum_areas_across(mesh, blocks, across, count)
-    _sum_rings(parallel, mesh, blocks, options, across, count, sums)
+    _sum_rings(parallel, mesh, blocks, options, sums)
     _sum_rings_across(mesh, blocks, options, across, count, sums)
     if options.slide:
         _aim_boundary(parallel, mesh, blocks, sums)
@@ -98,7 +97,7 @@ def _add_areas(X, a, b, c):
 
 
 @driver
-def _sum_rings(mesh, blocks, options, across, count, sums):
+def _sum_rings(mesh, blocks, options, sums):
     for k in prange(blocks.face.size - 1):
         low = blocks.vertex[k]
         high = blocks.vertex[k + 1]
@@ -135,12 +134,9 @@ def _add_face(X, a, b, c, options, sums):
     if norm == 0.0:
         return
     ux, uy, uz = nx / norm, ny / norm, nz / norm
-    wa = wb = wc = norm
-    if options.angle_normals:
-        wa, wb, wc = corner_angles(X, a, b, c)
-    _add_normal(sums, a, wa, ux, uy, uz)
-    _add_normal(sums, b, wb, ux, uy, uz)
-    _add_normal(sums, c, wc, ux, uy, uz)
+    _add_normal(sums, a, norm, ux, uy, uz)
+    _add_normal(sums, b, norm, ux, uy, uz)
+    _add_normal(sums, c, norm, ux, uy, uz)
     if options.stiffness > 0.0:
         _add_tensor(sums, a, ux, uy, uz, nx, ny, nz, norm)
         _add_tensor(sums, b, ux, uy, uz, nx, ny, nz, norm)
