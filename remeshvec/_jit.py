@@ -32,7 +32,7 @@ __all__ = ["available_threads", "compile_notice", "driver", "inlined", "kernel",
 _FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 # Without `_nrt` a helper counts no references. Passing records of arrays to helpers that do costs
-# a quarter of the time of a call, in atomic instructions that two threads fight for; in return such
+# about a quarter of the time of a call, in atomic instructions that two threads fight for; in return such
 # a helper cannot allocate. Not cached: helpers live in the caches of the kernels that use them.
 _INLINED: dict[str, Any] = {**_FLAGS, "forceinline": True, "_nrt": False}
 

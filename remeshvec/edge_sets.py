@@ -7,7 +7,7 @@ cut into blocks whose number depends on the size of the mesh only, and a phase r
 * ``OWNED``: a block takes the candidates whose whole footprint lies in its own vertex range. Sets
   of different blocks cannot conflict: blocks run in parallel, each in order, in place.
 * ``SHIFTED``: the same over blocks shifted by half a block, for what straddled a border.
-* ``REST``: what is left, about 2 %, on one thread.
+* ``REST``: the few that are left, on one thread.
 
 So the result is that of one fixed sequence, however many threads run it, and no edge is frozen at a
 border. Independent sets by rounds [Luby 1986] cost 4 to 10 times the work and were dropped.
@@ -41,8 +41,8 @@ REST = 2
 
 DONE = -1
 
-# Faces in a block. Smaller blocks balance better over threads, but 8 % of the edges straddle a
-# border at 16,384 faces, 12 % at 8,192; below 1.5 blocks a mesh is one block and has no border.
+# Faces in a block. Smaller blocks balance better over threads, larger ones have fewer edges across
+# borders; below 1.5 blocks a mesh is one block and has no border.
 FACES_PER_BLOCK = 12288
 
 

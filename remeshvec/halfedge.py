@@ -80,8 +80,7 @@ def build_mesh(X: FloatArray, F: IndexArray) -> tuple[Mesh, BuildReport]:
 def _match_twins(origin, twin, n, is_cut):
     """Pair opposite half-edges by chains of the edges seen at one end of each.
 
-    That is the end with fewer edges: the hub of a fan of any size costs linear time in all. (Sorting
-    costs 10 times as much.)
+    That is the end with fewer edges: the hub of a fan of any size costs linear time in all.
     """
     uses = np.zeros(n, np.int32)
     for h in range(origin.size):

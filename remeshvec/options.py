@@ -47,10 +47,10 @@ class Options:
         return cos(radians(self.foldover))
 
 
-# Tight thresholds first, relaxed later, give even edges without oscillation (area error -0.4 points,
-# valence 6 +0.7); the schedule is stretched over the sweeps. More sweeps even out areas and let
-# vertices slide off ridges, which the stiffness prevents: with 60 instead of 20, RMS distance falls by
-# a tenth on iphi_bad10k. Angle-weighted normals hold ridges too, for half a point of area error.
+# Tight thresholds first, relaxed later, give even edges without oscillation; the schedule is stretched
+# over the sweeps. Sweeps even out areas and let vertices slide off ridges, which the stiffness
+# prevents. `docs/ablation.md` has what each is worth on meshes that these constants were not chosen on;
+# the last digits are worth nothing.
 _DEFAULT = Options(
     preset="default",
     iterations=12,

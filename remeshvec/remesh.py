@@ -93,7 +93,7 @@ def remesh(
         Degrees; triangles with a smaller angle are improved at the end. 41.5 by default, except for the
         preset ``"fast"``, which does not.
     fit : bool, optional
-        Let vertices leave the input by up to 0.2 L so that faces straddle it: about a quarter less RMS
+        Let vertices leave the input by up to 0.2 L so that faces straddle it: less RMS
         distance. On in ``"fine"``.
     threads : int, optional
         Threads to use at most; all by default. Meshes below 50,000 faces use one.

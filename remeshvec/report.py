@@ -18,7 +18,7 @@ __all__ = ["RemeshResult", "Report", "Stopwatch"]
 
 
 class _Lap:
-    """One timed block; a generator in its place takes 5 times as long, which small meshes notice."""
+    """One timed block; a generator in its place is slower, which small meshes notice."""
 
     __slots__ = ("phase", "seconds", "start")
 

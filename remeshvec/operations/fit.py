@@ -1,7 +1,7 @@
 """Fit: move vertices along their normals until faces straddle the input instead of cutting through it.
 
 A mesh whose vertices lie on a curved surface lies inside it everywhere else. Half of the ring's mean
-signed distance takes a quarter off the RMS distance, at the price that vertices no longer lie on the
+signed distance takes a good part off the RMS distance (`docs/quality.md`), at the price that vertices no longer lie on the
 input. Offered as an option.
 """
 
