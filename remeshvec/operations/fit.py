@@ -1,8 +1,8 @@
 """Fit: move vertices along their normals until faces straddle the input instead of cutting through it.
 
 A mesh whose vertices lie on a curved surface lies inside it everywhere else. Half of the ring's mean
-signed distance takes a good part off the RMS distance (`docs/quality.md`), at the price that vertices no longer lie on the
-input. Offered as an option.
+signed distance takes a good part off the RMS distance (`docs/quality.md`), at the price that vertices
+no longer lie on the input. Offered as an option.
 """
 
 from __future__ import annotations
