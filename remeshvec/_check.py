@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import MeshInputError
+from .errors import MeshInputError, OptionError
 
 __all__ = ["as_faces", "as_mesh", "as_vertices", "positive_count"]
 
@@ -81,8 +81,6 @@ def as_faces(F: ArrayLike, n_vertices: int) -> NDArray[np.int64]:
 
 def positive_count(value: Any, name: str) -> int:
     """Check an option that counts something, at least one."""
-    from .errors import OptionError
-
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise OptionError(f"{name} must be a whole number, at least 1; got {value!r}")
     return int(value)

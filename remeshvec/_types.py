@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,6 @@ __all__ = [
 
 IndexArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
-AnyArray = NDArray[Any]
 
 NONE = -1  # no twin: the half-edge lies on the boundary
 DEAD = -1  # origin of all three half-edges of a removed face

@@ -30,7 +30,7 @@ N_SUMS = 16
 class RelaxOptions(NamedTuple):
     """How vertices relax."""
 
-    stiffness: float  # 20: vertices on curved ridges stay; 0: off
+    stiffness: float  # hold of curved ridges on their vertices; 0: off
     slide: bool  # boundary vertices move along the boundary
 
 
