@@ -9,10 +9,12 @@ from .mesh_files import MeshFile, read_mesh, write_mesh
 from .quality import Quality, quality
 from .remesh import remesh
 from .report import RemeshResult, Report
+from .sizing import Adaptive
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Adaptive",
     "MeshFile",
     "MeshFormatError",
     "MeshInputError",

@@ -17,6 +17,10 @@ examples:
   remeshvec cat.obj -o even.obj                       write the new mesh
   remeshvec part.stl -o part.ply --length 0.5         edges of length 0.5
   remeshvec cat.obj -o even.obj --picture even.png    and a picture of both
+  remeshvec part.stl -o part.ply --feature-angle 30   keep edges that turn by more than 30 degrees
+  remeshvec cat.obj -o fine.obj --adaptive 0.001      short edges where the surface is curved
+
+FILE of numbers: text (white space or commas, # starts a comment) or .npy; indices count from 0.
 """
 
 
@@ -31,12 +35,14 @@ def parser() -> argparse.ArgumentParser:
     )
     result.add_argument("input", metavar="INPUT", help="mesh file")
     result.add_argument("-o", "--output", metavar="OUTPUT", help="mesh file to write")
+    _add_size_options(result.add_argument_group("how long edges become"))
+    _add_constraints(result.add_argument_group("what to keep"))
     _add_remesh_options(result.add_argument_group("how to remesh"))
     _add_report_options(result.add_argument_group("what to show and save"))
     return result
 
 
-def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
+def _add_size_options(group: argparse._ArgumentGroup) -> None:
     length = group.add_mutually_exclusive_group()
     length.add_argument("--length", type=_positive, metavar="L", help="target edge length")
     length.add_argument(
@@ -46,13 +52,80 @@ def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
         metavar="X",
         help="target edge length as a multiple of the mean edge length (default %(default)s)",
     )
+    length.add_argument("--lengths", metavar="FILE", help="target edge length at every vertex")
+    length.add_argument(
+        "--adaptive",
+        type=_positive,
+        metavar="TOL",
+        help="edge length from the curvature, so that faces stay within TOL of the surface",
+    )
+    length.add_argument("--n-faces", type=_at_least_one, metavar="N", help="number of faces wanted")
+    length.add_argument(
+        "--n-vertices", type=_at_least_one, metavar="N", help="number of vertices wanted"
+    )
+    group.add_argument(
+        "--min-length", type=_positive, metavar="L", help="shortest length for --adaptive"
+    )
+    group.add_argument(
+        "--max-length", type=_positive, metavar="L", help="longest length for --adaptive"
+    )
+    group.add_argument(
+        "--gradation",
+        type=_positive,
+        metavar="X",
+        help="largest ratio of the lengths at the ends of an edge (default 1.5)",
+    )
+    group.add_argument(
+        "--max-deviation",
+        type=_positive,
+        metavar="D",
+        help="largest distance between the input and the result",
+    )
+
+
+def _add_constraints(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--feature-angle",
+        type=_feature_angle,
+        default="auto",
+        metavar="DEG",
+        help="keep edges that turn by more; auto: those that stand out (default), none: no edges",
+    )
+    group.add_argument(
+        "--boundary",
+        choices=("free", "split", "fixed"),
+        default="free",
+        help="boundary vertices slide along it (free), stay and get new ones between (split), or "
+        "stay as they are (fixed)",
+    )
+    group.add_argument("--feature-edges", metavar="FILE", help="edges to keep, two vertices each")
+    group.add_argument("--fixed-vertices", metavar="FILE", help="vertices that stay")
+    group.add_argument("--fixed-faces", metavar="FILE", help="faces that stay")
+    group.add_argument(
+        "--selection", metavar="FILE", help="faces to remesh; all others stay and come first"
+    )
+    group.add_argument(
+        "--face-labels", metavar="FILE", help="a whole number a face, whose borders are kept"
+    )
+
+
+def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--preset",
         choices=("default", "fast", "fine"),
         default="default",
         help="fast: the published algorithm; fine: more sweeps and a closer fit",
     )
-    group.add_argument("--iterations", type=_at_least_one, metavar="N", help="number of sweeps")
+    group.add_argument(
+        "--iterations", type=_at_least_one, metavar="N", help="number of sweeps at most"
+    )
+    group.add_argument(
+        "--tol",
+        type=_positive,
+        metavar="X",
+        help="stop when a sweep changes less than this share of the edges and moves vertices by less "
+        "than this multiple of the target length",
+    )
     group.add_argument(
         "--split",
         type=_positive,
@@ -96,6 +169,11 @@ def _add_report_options(group: argparse._ArgumentGroup) -> None:
         "--save-stats", metavar="FILE", help="write the measures before and after, as JSON"
     )
     group.add_argument(
+        "--save-arrays",
+        metavar="FILE",
+        help="write births, labels, maps, feature edges, corners and lengths, as .npz",
+    )
+    group.add_argument(
         "--picture", metavar="FILE", help="render both meshes side by side (PNG or JPEG)"
     )
     group.add_argument("--visualize", action="store_true", help="show both meshes in a window")
@@ -119,3 +197,9 @@ def _at_least_one(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"{text} is less than 1")
     return value
+
+
+def _feature_angle(text: str) -> float | str | None:
+    if text in ("auto", "none"):
+        return None if text == "none" else text
+    return _positive(text)

@@ -8,13 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "APEX",
-    "BOUNDARY",
+    "CURVE",
     "DEAD",
     "FIXED",
+    "FROZEN",
+    "HELD",
     "INNER",
     "MAX_VALENCE",
     "NONE",
+    "PINNED",
+    "SEAM",
     "Blocks",
     "FloatArray",
     "IndexArray",
@@ -25,14 +28,19 @@ __all__ = [
 IndexArray = NDArray[np.int32]
 FloatArray = NDArray[np.float64]
 
-NONE = -1  # no twin: the half-edge lies on the boundary
+NONE = -1  # no twin: the half-edge lies on the boundary; no curve: the edge is no feature
 DEAD = -1  # origin of all three half-edges of a removed face
+
+# Edges on feature curves name a half-edge of the reference surface that lies on the same curve.
+FROZEN = -2  # instead of that: the edge stays as it is
+SEAM = 1 << 30  # added to that: the edge has siblings on other sheets, which must do what it does
 
 # Kinds of vertices, in the order of what they may do; a collapse keeps the larger kind.
 INNER = 0  # moves freely
-APEX = 1  # tip of a horn: held during the sweeps, an inner vertex afterwards
-BOUNDARY = 2  # stays on its boundary loop
-FIXED = 3  # never moves, never vanishes
+HELD = 1  # an inner vertex that the sweeps hold: the tip of a horn, or where moves lead too far
+CURVE = 2  # slides along its feature curve: a crease, the boundary, a border between labels
+PINNED = 3  # a vertex of a curve that the sweeps hold
+FIXED = 4  # a vertex of the input that never moves, never vanishes
 
 # Bound for every walk around a vertex. A structure that passed the build always closes sooner; the
 # bound turns a broken one into a wrong answer instead of a hang.
@@ -48,20 +56,28 @@ class Mesh(NamedTuple):
         Origin vertex of every half-edge; ``DEAD`` in removed faces.
     twin : (3 m,) int32
         Opposite half-edge, ``NONE`` on the boundary.
+    curve : (3 m,) int32
+        ``NONE`` off feature curves; see ``FROZEN`` and ``SEAM`` for the others. Both half-edges of an
+        edge are on a curve or neither is.
+    source : (m,) int32
+        Face of the reference surface, in the same patch between curves: where the face comes from.
     vertex_halfedge : (n,) int32
         One outgoing half-edge; for a boundary vertex the one without twin; ``DEAD`` if removed.
     valence_excess : (n,) int32
         Valence minus 6, or minus 4 on the boundary.
     X : (n, 4) float64
-        Coordinates, and in the last column the mixed Voronoi area while relaxing.
+        Coordinates, and in the last column the target edge length.
     kind : (n,) uint8
-        ``INNER``, ``APEX``, ``BOUNDARY`` or ``FIXED``.
+        ``INNER``, ``HELD``, ``CURVE``, ``PINNED`` or ``FIXED``.
     birth : (n,) int32
-        Face of the reference surface on or near which the vertex lies.
+        Half-edge of the reference surface: on its face lies an inner vertex, on its edge the vertex
+        of a curve; a fixed vertex is its origin.
     """
 
     origin: IndexArray
     twin: IndexArray
+    curve: IndexArray
+    source: IndexArray
     vertex_halfedge: IndexArray
     valence_excess: IndexArray
     X: FloatArray
@@ -84,7 +100,9 @@ class Tree(NamedTuple):
     corners : (m, 9) float64
         Corner coordinates of every face, in Morton order.
     twin : (3 m,) int32
-        Opposite half-edges, for walks from face to face.
+        Opposite half-edges, ``NONE`` on feature curves: no walk leaves its patch.
+    patch : (m,) int32
+        Patch of every face: what walks can reach.
     boxes : (k, 6) float64
         Lower and upper corners of the boxes, leaves first.
     level : (l + 1,) int64
@@ -93,5 +111,6 @@ class Tree(NamedTuple):
 
     corners: FloatArray
     twin: IndexArray
+    patch: IndexArray
     boxes: FloatArray
     level: NDArray[np.int64]

@@ -13,19 +13,30 @@ from numba import prange
 
 from ._jit import driver, inlined
 from ._types import NONE, FloatArray, IndexArray, Tree
-from .geometry import closest_on_triangle
+from .geometry import closest_on_triangle, face_vector
 from .halfedge import following, previous
 
-__all__ = ["STACK", "build_tree", "closest_face", "point_on_face", "walk_to_face"]
+__all__ = [
+    "STACK",
+    "build_tree",
+    "closest_face",
+    "closest_faces",
+    "point_on_face",
+    "search_face",
+    "walk_to_face",
+]
 
 _LEAF = 4  # faces in a leaf
 _ARITY = 4  # boxes in a node
 _WALK = 64  # steps of a walk
 _FAN = 32  # faces around a corner that one step looks at
+_POINTS = 256  # points that follow each other in one query
 STACK = 64  # boxes waiting: 3 a level and 16 levels hold 4e9 leaves
 
 
-def build_tree(X: FloatArray, F: IndexArray, twin: IndexArray, parallel: bool) -> Tree:
+def build_tree(
+    X: FloatArray, F: IndexArray, twin: IndexArray, patch: IndexArray, parallel: bool
+) -> Tree:
     """Build the tree over faces in Morton order.
 
     Parameters
@@ -33,7 +44,9 @@ def build_tree(X: FloatArray, F: IndexArray, twin: IndexArray, parallel: bool) -
     X : (n, 3) or (n, 4) float64
     F : (m, 3) int32
     twin : (3 m,) int32
-        Opposite half-edges, `NONE` on the boundary.
+        Opposite half-edges, ``NONE`` where no walk goes on.
+    patch : (m,) int32
+        Patch of every face: what walks can reach.
     """
     counts = [-(-len(F) // _LEAF)]
     while counts[-1] > 1:
@@ -45,7 +58,7 @@ def build_tree(X: FloatArray, F: IndexArray, twin: IndexArray, parallel: bool) -
     _fill_leaves(parallel, X, F, corners, boxes)
     for i in range(1, len(counts)):
         _fill_level(boxes, level[i - 1], level[i], level[i + 1])
-    return Tree(corners, twin, boxes, level)
+    return Tree(corners, twin, patch, boxes, level)
 
 
 @driver
@@ -149,16 +162,29 @@ def walk_to_face(tree, x, y, z, start):
 
 @inlined
 def closest_face(tree, x, y, z, hint, trust, stack):
-    """Face closest to a point, with weights of its corners 1 and 2 and the squared distance.
+    """Face of the hint's patch closest to a point, with weights of its corners 1 and 2.
 
-    Ties go to the face where the walk from the hint ends. What it finds within a squared distance of
-    ``trust`` is taken without a search: 0 for the exact answer, inf for the walk alone. ``stack`` is
-    (2, STACK) int64 scratch: boxes waiting and their levels.
+    The squared distance comes last. Ties go to the face where the walk from the hint ends. What it
+    finds within a squared distance of ``trust`` is taken without a search: 0 for the exact answer,
+    inf for the walk alone. ``stack`` is (2, STACK) int64 scratch: boxes waiting and their levels.
     """
-    best, s, t, distance = walk_to_face(tree, x, y, z, hint)
+    face, s, t, distance = walk_to_face(tree, x, y, z, hint)
     if distance <= trust:
-        return best, s, t, distance
+        return face, s, t, distance
+    return search_face(tree, x, y, z, face, 0.0, 0.0, 0.0, stack)
+
+
+@inlined
+def search_face(tree, x, y, z, face, nx, ny, nz, stack):
+    """Search the whole patch of a face for the face closest to a point, starting with that face.
+
+    With a normal, faces that look the other way do not count, unless the search started there: on a
+    thin sheet a point does not go to the other side.
+    """
+    best = face
+    s, t, distance = face_distance(tree.corners, face, x, y, z)
     seen = best
+    patch = tree.patch[seen]
     top = tree.level.size - 2
     stack[0, 0] = 0
     stack[1, 0] = top
@@ -169,9 +195,9 @@ def closest_face(tree, x, y, z, hint, trust, stack):
         d = stack[1, size]
         if d == 0:
             for f in range(_LEAF * i, min(_LEAF * i + _LEAF, tree.corners.shape[0])):
-                if f != seen:
+                if f != seen and tree.patch[f] == patch:
                     fs, ft, fd = face_distance(tree.corners, f, x, y, z)
-                    if fd < distance:
+                    if fd < distance and not _looks_away(tree.corners, f, nx, ny, nz):
                         best, s, t, distance = f, fs, ft, fd
             continue
         start = tree.level[d - 1]
@@ -182,3 +208,53 @@ def closest_face(tree, x, y, z, hint, trust, stack):
                 stack[1, size] = d - 1
                 size += 1
     return best, s, t, distance
+
+
+@inlined
+def _looks_away(corners, f, nx, ny, nz):
+    mx, my, mz = face_vector(
+        corners[f, 0], corners[f, 1], corners[f, 2],
+        corners[f, 3], corners[f, 4], corners[f, 5],
+        corners[f, 6], corners[f, 7], corners[f, 8],
+    )  # fmt: skip
+    return mx * nx + my * ny + mz * nz < 0.0
+
+
+def closest_faces(
+    tree: Tree, points: FloatArray, hint: IndexArray, trust: float, parallel: bool
+) -> tuple[IndexArray, FloatArray]:
+    """Find the closest face of many points.
+
+    Parameters
+    ----------
+    tree : Tree
+    points : (k, 3) float64
+        Best in an order in which neighbours follow each other.
+    hint : (k,) int32
+        Face to start at, whose patch alone is searched; ``NONE``: where the point before ended.
+    trust : float
+        A face within this distance is good enough; 0 for the closest.
+    parallel : bool
+
+    Returns
+    -------
+    face : (k,) int32
+    distance : (k,) float64
+    """
+    face = np.empty(len(points), np.int32)
+    distance = np.empty(len(points))
+    _closest_faces(parallel, tree, points, hint, trust * trust, face, distance)
+    return face, np.sqrt(distance)
+
+
+@driver
+def _closest_faces(tree, points, hint, trust, face, distance):
+    for k in prange(-(-points.shape[0] // _POINTS)):
+        stack = np.empty((2, STACK), np.int64)
+        last = np.int64(0)
+        for i in range(_POINTS * k, min(_POINTS * k + _POINTS, points.shape[0])):
+            start = last if hint[i] == NONE else np.int64(hint[i])
+            last, _, _, distance[i] = closest_face(
+                tree, points[i, 0], points[i, 1], points[i, 2], start, trust, stack
+            )
+            face[i] = last

@@ -16,6 +16,7 @@ from typing import Any, TextIO
 import remeshvec
 
 from ._arguments import DEFAULT_FACTOR, parser
+from ._array_files import read_array, write_arrays
 from .errors import OptionError, RemeshvecError
 from .mesh_files import (
     SUFFIXES,
@@ -27,6 +28,7 @@ from .mesh_files import (
 )
 from .quality import quality, side_by_side
 from .report import RemeshResult
+from .sizing import Adaptive
 
 __all__ = ["main"]
 
@@ -84,6 +86,8 @@ def _run(options: argparse.Namespace) -> None:
             write_mesh(options.output, result.V, result.F)
     if options.save_stats:
         _save_stats(options, mesh, result)
+    if options.save_arrays:
+        write_arrays(options.save_arrays, result)
     if options.picture:
         _make_picture(options, mesh, result)
     if not options.quiet:
@@ -98,42 +102,75 @@ def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse before the work starts what could not be written or shown after it."""
     if options.output:
         check_writable(options.output, SUFFIXES)
-    if options.save_stats:
-        check_writable(options.save_stats)
+    for path in (options.save_stats, options.save_arrays):
+        if path:
+            check_writable(path)
     if options.picture or options.visualize:
         from . import viz
 
         viz.require_viewer(window=options.visualize)
         if options.picture:
             check_writable(options.picture, viz.PICTURE_SUFFIXES)
-    named = [options.output, options.save_stats, options.picture]
+    named = [options.output, options.save_stats, options.save_arrays, options.picture]
     paths = [Path(name).resolve() for name in named if name]
     if len(set(paths)) < len(paths):
-        raise OptionError("the output, the statistics and the picture need names of their own")
+        raise OptionError("the output, the statistics, the arrays and the picture need names of their own")
     if Path(options.input).resolve() in paths[bool(options.output) :]:
-        raise OptionError(f"the statistics or the picture would replace {options.input}")
+        raise OptionError(f"the statistics, the arrays or the picture would replace {options.input}")
 
 
-def _length(options: argparse.Namespace, mesh: MeshFile) -> float | None:
-    """Return the target length, None for the library's default."""
+def _length(options: argparse.Namespace, mesh: MeshFile) -> Any:
+    """Return the target length, None for the library's default or where a count is asked for."""
+    if options.adaptive is not None:
+        return Adaptive(options.adaptive, options.min_length, options.max_length)
+    if options.min_length is not None or options.max_length is not None:
+        raise OptionError("--min-length and --max-length go with --adaptive")
+    if options.lengths is not None:
+        return read_array(options.lengths, whole=False)
     if options.length is not None or options.l_factor == DEFAULT_FACTOR:
         return options.length
     return options.l_factor * quality(mesh.V, mesh.F).edge_mean
 
 
+# Arguments that name files of indices, with the numbers in a row.
+_ARRAYS = {
+    "feature_edges": 2,
+    "fixed_vertices": 1,
+    "fixed_faces": 1,
+    "selection": 1,
+    "face_labels": 1,
+}
+
+# Arguments that the library knows under the same name.
+_SAME = (
+    "iterations",
+    "tol",
+    "split",
+    "collapse",
+    "foldover",
+    "sliver_check",
+    "fit",
+    "threads",
+    "gradation",
+    "n_faces",
+    "n_vertices",
+    "max_deviation",
+)
+
+
 def _library_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return those options that were given, so that the presets decide on the others."""
-    given = {
-        "iterations": options.iterations,
-        "split": options.split,
-        "collapse": options.collapse,
-        "foldover": options.foldover,
-        "sliver_check": options.sliver_check,
-        "project": False if options.no_project else None,
-        "fit": options.fit,
-        "threads": options.threads,
+    given = {name: getattr(options, name) for name in _SAME}
+    given["project"] = False if options.no_project else None
+    for name, columns in _ARRAYS.items():
+        path = getattr(options, name)
+        given[name] = None if path is None else read_array(path, columns)
+    chosen = {
+        "preset": options.preset,
+        "feature_angle": options.feature_angle,
+        "boundary": options.boundary,
     }
-    return {"preset": options.preset} | {k: v for k, v in given.items() if v is not None}
+    return chosen | {k: v for k, v in given.items() if v is not None}
 
 
 @contextmanager
@@ -220,6 +257,11 @@ def _print_report(
         print(f"note: {notice}")
     for name, count in report.dirt.items():
         print(f"note: {name.replace('_', ' ')}: {count:,}")
+    kept = {name: count for name, count in report.features.items() if count}
+    if kept:
+        print("features: " + ", ".join(f"{k.replace('_', ' ')} {n:,}" for k, n in kept.items()))
+    for way, distance in report.deviation.items():
+        print(f"deviation {way.replace('_', ' ')}: {distance:.4g}")
     print(
         f"target length {report.target_length:.4g}, preset {report.preset}, "
         f"{len(report.sweeps)} sweeps in {seconds['total']:.2f} s; {report.stop}"
@@ -231,7 +273,7 @@ def _print_report(
         for name, passed in seconds.items():
             print(f"{'remesh, total' if name == 'total' else name:<31}{passed:>12.3f} s")
         print()
-    for path in (options.output, options.save_stats, options.picture):
+    for path in (options.output, options.save_stats, options.save_arrays, options.picture):
         if path:
             print(f"written: {path}")
     if not options.output:

@@ -18,6 +18,7 @@ __all__ = [
     "corner_angles",
     "distance_squared",
     "face_vector",
+    "is_flat",
     "mean_ratio",
     "mixed_voronoi_areas",
     "tangent_basis",
@@ -50,6 +51,15 @@ def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):
     wy = cy - ay
     wz = cz - az
     return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+
+
+@inlined
+def is_flat(nx, ny, nz, longest_squared):
+    """Tell whether a face is lower than 1e-5 of its longest side, from its vector: three points of a
+    straight line but for rounding.
+    """
+    limit = 1e-5 * longest_squared
+    return nx * nx + ny * ny + nz * nz < limit * limit
 
 
 @inlined

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ._jit import inlined, kernel
-from ._types import BOUNDARY, DEAD, FIXED, INNER, NONE, FloatArray, IndexArray, Mesh
+from ._types import CURVE, DEAD, INNER, NONE, FloatArray, IndexArray, Mesh
 
 __all__ = ["BuildReport", "build_mesh", "following", "previous"]
 
@@ -39,11 +39,11 @@ class BuildReport(NamedTuple):
     doubled_faces: int  # faces that share two edges with another: same corners, opposite winding
 
 
-def build_mesh(X: FloatArray, F: IndexArray) -> tuple[Mesh, BuildReport]:
+def build_mesh(X: FloatArray, F: IndexArray) -> tuple[Mesh, BuildReport, IndexArray]:
     """Connect faces to a manifold half-edge mesh.
 
-    Edges with more than two faces or two equally directed ones are cut open and their vertices
-    fixed; a vertex that holds several fans becomes one vertex a fan.
+    Edges with more than two faces or two equally directed ones are cut open; a vertex that holds
+    several fans becomes one vertex a fan.
 
     Parameters
     ----------
@@ -51,12 +51,19 @@ def build_mesh(X: FloatArray, F: IndexArray) -> tuple[Mesh, BuildReport]:
         Coordinates in the first three columns; every vertex is used by a face.
     F : (m, 3) int32
         Faces without repeated corners or duplicates.
+
+    Returns
+    -------
+    mesh : Mesh
+        Boundary edges are curves, all else is free.
+    found : BuildReport
+    source : (k,) int32
+        Row of ``X`` for every vertex of the mesh.
     """
     n = len(X)
     origin = F.reshape(-1).copy()
     twin = np.empty(origin.size, np.int32)
-    is_cut = np.zeros(n, np.uint8)
-    non_manifold, inconsistent = _match_twins(origin, twin, n, is_cut)
+    non_manifold, inconsistent = _match_twins(origin, twin, n)
     source = np.empty(origin.size, np.int32)
     n_fans = _split_fans(origin, twin, n, source)
     source = source[: n_fans - n]
@@ -64,6 +71,8 @@ def build_mesh(X: FloatArray, F: IndexArray) -> tuple[Mesh, BuildReport]:
     mesh = Mesh(
         origin,
         twin,
+        np.full(origin.size, NONE, np.int32),
+        np.arange(len(F), dtype=np.int32),
         np.full(n_fans, DEAD, np.int32),
         np.zeros(n_fans, np.int32),
         X,
@@ -71,13 +80,12 @@ def build_mesh(X: FloatArray, F: IndexArray) -> tuple[Mesh, BuildReport]:
         np.zeros(n_fans, np.int32),
     )
     doubled = _fill_vertices(mesh)
-    mesh.kind[:n][is_cut != 0] = FIXED
-    mesh.kind[n:][is_cut[source] != 0] = FIXED
-    return mesh, BuildReport(non_manifold, inconsistent, len(np.unique(source)), doubled)
+    found = BuildReport(non_manifold, inconsistent, len(np.unique(source)), doubled)
+    return mesh, found, np.concatenate([np.arange(n, dtype=np.int32), source])
 
 
 @kernel
-def _match_twins(origin, twin, n, is_cut):
+def _match_twins(origin, twin, n):
     """Pair opposite half-edges by chains of the edges seen at one end of each.
 
     That is the end with fewer edges: the hub of a fan of any size costs linear time in all.
@@ -118,8 +126,6 @@ def _match_twins(origin, twin, n, is_cut):
                 twin[g] = NONE
             else:
                 inconsistent -= 1
-        is_cut[v] = 1
-        is_cut[w] = 1
     return non_manifold, inconsistent
 
 
@@ -158,7 +164,7 @@ def _split_fans(origin, twin, n, source):
 
 @kernel
 def _fill_vertices(mesh):
-    """Set ``vertex_halfedge``, kinds and valences from origins and twins; counts doubled faces."""
+    """Set what follows from origins and twins; boundary edges become curves. Counts doubled faces."""
     doubled = 0
     for v in range(mesh.vertex_halfedge.size):
         mesh.valence_excess[v] = -6
@@ -170,7 +176,8 @@ def _fill_vertices(mesh):
         mesh.valence_excess[v] += 1
         if mesh.twin[h] == NONE:
             mesh.vertex_halfedge[v] = h
-            mesh.kind[v] = BOUNDARY
+            mesh.kind[v] = CURVE
+            mesh.curve[h] = h
             mesh.valence_excess[v] += 3
         else:
             if mesh.kind[v] == INNER:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, isfinite, radians
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,8 @@ class Options:
     untangle_rounds: int = 4
     untangle_angle: float = 41.5  # degrees; triangles below it are untangled
     fit_rounds: int = 0
+    tol: float | None = None  # stop where a sweep changes less
+    max_deviation: float | None = None  # distance from the input, in its units
     threads: int = 1
 
     @property
@@ -112,6 +115,10 @@ def make_options(preset: str, overrides: dict[str, Any]) -> Options:
         changes["foldover"] = _angle("foldover", given.pop("foldover"))
     if "untangle_angle" in given:
         changes["untangle_angle"] = _angle("untangle_angle", given.pop("untangle_angle"))
+    if "tol" in given:
+        changes["tol"] = _share("tol", given.pop("tol"))
+    if "max_deviation" in given:
+        changes["max_deviation"] = _distance("max_deviation", given.pop("max_deviation"))
     for name in ("sliver_check", "project"):
         if name in given:
             changes[name] = _flag(name, given.pop(name))
@@ -160,6 +167,23 @@ def _angle(name: str, value: Any) -> float:
     if not (isfinite(angle) and 0.0 < angle < 90.0):
         raise OptionError(f"{name} must be an angle in degrees between 0 and 90; got {value!r}")
     return angle
+
+
+def _share(name: str, value: Any) -> float:
+    if not _is_number(value) or not 0.0 <= value <= 1.0:
+        raise OptionError(f"{name} must be a share between 0 and 1; got {value!r}")
+    return float(value)
+
+
+def _distance(name: str, value: Any) -> float:
+    if not _is_number(value) or not value > 0.0:
+        raise OptionError(f"{name} must be a positive distance in the units of V; got {value!r}")
+    return float(value)
+
+
+def _is_number(value: Any) -> bool:
+    is_real = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
+    return is_real and isfinite(value)
 
 
 def _flag(name: str, value: Any) -> bool:

@@ -1,32 +1,21 @@
-"""From the caller's arrays to what the sweeps need: a clean, ordered mesh and the reference surface."""
+"""From the caller's arrays to a clean, ordered, connected mesh."""
 
 from __future__ import annotations
 
-from math import floor, isfinite, log2, sqrt
-from numbers import Real
+from math import floor, log2
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jit import kernel
-from ._types import APEX, FIXED, NONE, FloatArray, Mesh
-from .boundary import link_boundary
-from .bvh import build_tree
+from ._types import NONE, FloatArray, IndexArray, Mesh
 from .clean import drop_degenerate_faces, drop_duplicate_faces, weld_vertices
-from .errors import MeshInputError, OptionError
-from .features import apexes, boundary_corners
-from .geometry import distance_squared, face_vector
-from .halfedge import BuildReport, build_mesh, following
-from .operations.project import Reference
-from .order import Ordered, order_mesh
+from .errors import MeshInputError
+from .halfedge import BuildReport, build_mesh
+from .order import order_mesh
+from .orient import orient_faces
 
-__all__ = ["Prepared", "build_reference", "choose_length", "prepare"]
-
-
-# Longest target length in the frame of `Prepared`, where the mesh has an extent below 2: longer ones
-# mean the same, and their squares might overflow.
-_LONGEST = 1e6
+__all__ = ["Prepared", "prepare"]
 
 
 class Prepared(NamedTuple):
@@ -34,16 +23,24 @@ class Prepared(NamedTuple):
 
     mesh: Mesh
     face_source: NDArray[np.intp]  # (m,) input face of every face
+    vertex_source: IndexArray  # (n,) input vertex of every vertex
+    same: IndexArray | None  # (n_in,) the input vertex that stands for each; None: itself
+    flipped: NDArray[np.bool_] | None  # (m_in,) input faces whose corners 1 and 2 were swapped
     centre: FloatArray  # (3,)
     scale: float  # power of two
     dirt: dict[str, int]
 
+    def copy_mesh(self) -> Mesh:
+        """Return the mesh in arrays of its own: sweeps change them."""
+        return Mesh(*(array.copy() for array in self.mesh))
+
 
 def prepare(V: FloatArray, F: NDArray[np.int64], parallel: bool) -> Prepared:
-    """Clean, order and connect the input.
+    """Clean, orient, order and connect the input.
 
     Degenerate and duplicate faces go, vertices of the same place are welded where both lie on a
-    boundary (closed parts that touch stay apart), edges that no manifold has are cut.
+    boundary (closed parts that touch stay apart), faces are turned to the winding of their
+    neighbours, edges that no manifold has are cut.
     """
     dirt: dict[str, int] = {}
     used = np.zeros(len(V), np.bool_)
@@ -55,79 +52,64 @@ def prepare(V: FloatArray, F: NDArray[np.int64], parallel: bool) -> Prepared:
     F32 = F.astype(np.int32)
     source = np.arange(len(F))
     F32, source = _filter(F32, source, drop_degenerate_faces(F32), dirt, "degenerate_faces")
-    ordered, mesh, found = _connect(V, F32, parallel)
+    connected = _connect(V, F32, parallel)
+    found = connected.found
     if found.non_manifold_edges or found.inconsistent_edges or found.doubled_faces:
         kept = drop_duplicate_faces(F32)
         if kept is not None:
             F32, source = _filter(F32, source, kept, dirt, "duplicate_faces")
-            ordered, mesh, found = _connect(V, F32, parallel)
-    on_boundary = np.unique(mesh.origin[mesh.twin == NONE])
-    on_boundary = on_boundary[on_boundary < len(ordered.vertex_source)]
-    target = weld_vertices(V, ordered.vertex_source[on_boundary]) if len(on_boundary) else None
-    if target is not None:
-        _note(dirt, "welded_vertices", int((target != np.arange(len(V))).sum()))
-        F32 = target[F32]
+            connected = _connect(V, F32, parallel)
+    on_boundary = np.unique(connected.mesh.origin[connected.mesh.twin == NONE])
+    same = None
+    if len(on_boundary):
+        same = weld_vertices(V, np.unique(connected.vertex_source[on_boundary]))
+    if same is not None:
+        _note(dirt, "welded_vertices", int((same != np.arange(len(V))).sum()))
+        F32 = same[F32]
         F32, source = _filter(F32, source, drop_degenerate_faces(F32), dirt, "degenerate_faces")
         F32, source = _filter(F32, source, drop_duplicate_faces(F32), dirt, "duplicate_faces")
-        ordered, mesh, found = _connect(V, F32, parallel)
-    for name in ("non_manifold_edges", "inconsistent_edges", "pinched_vertices"):
-        _note(dirt, name, getattr(found, name))
-    mesh.birth[:] = mesh.vertex_halfedge
-    return Prepared(mesh, source[ordered.face_source], centre, scale, dirt)
+        connected = _connect(V, F32, parallel)
+    flipped = None
+    if connected.found.inconsistent_edges or connected.found.non_manifold_edges:
+        F32, turned = orient_faces(F32, len(V))
+        if turned.any():
+            _note(dirt, "flipped_faces", int(turned.sum()))
+            flipped = np.zeros(len(F), np.bool_)
+            flipped[source[turned]] = True
+            connected = _connect(V, F32, parallel)
+    _note(dirt, "non_manifold_edges", connected.found.non_manifold_edges)
+    _note(dirt, "inconsistent_edges", connected.found.inconsistent_edges)
+    if connected.found.pinched_vertices:
+        _note(dirt, "pinched_vertices", _count_pinched(connected))
+    return Prepared(
+        connected.mesh, source[connected.face_source], connected.vertex_source, same, flipped,
+        centre, scale, dirt,
+    )  # fmt: skip
 
 
-def choose_length(prepared: Prepared, L: float | None, max_faces: int) -> float:
-    """Target length in the prepared frame, checked against what it would make of the mesh.
-
-    Raises
-    ------
-    OptionError
-        ``L`` is no positive number, or would give more than ``max_faces`` faces, or is below the
-        precision of the coordinates.
-    """
-    area, mean_edge, flat = _measure(prepared.mesh)
-    _note(prepared.dirt, "zero_area_faces", flat)
-    if not area > 0.0:
-        raise MeshInputError("all faces of F have no area: there is no surface to remesh")
-    length = 0.9 * mean_edge if L is None else _positive(L) * prepared.scale
-    if length == 0.0:
-        length = 5e-324  # refused below; a product that underflows is no longer zero
-    expected = area / length / length / (sqrt(3.0) / 4.0)
-    if not expected <= max_faces:
-        raise OptionError(
-            f"L = {length / prepared.scale:g} would give about {expected:.3g} faces, more than "
-            f"max_faces = {max_faces:,}; the mean edge of the input is "
-            f"{mean_edge / prepared.scale:g}"
-        )
-    coordinate = float(np.abs(prepared.centre).max()) * prepared.scale + 1.0
-    if length < 1e3 * np.finfo(float).eps * coordinate:
-        raise OptionError(
-            f"L = {length / prepared.scale:g} is below the precision of coordinates near "
-            f"{coordinate / prepared.scale:g}; move the mesh to the origin"
-        )
-    return min(length, _LONGEST)
+class _Connected(NamedTuple):
+    mesh: Mesh
+    face_source: IndexArray
+    vertex_source: IndexArray
+    found: BuildReport
 
 
-def build_reference(mesh: Mesh, length: float, parallel: bool) -> Reference:
-    """Build the surface to project on, from a mesh before its first sweep; fixes corners and apexes."""
-    X = mesh.X.copy()
-    origin = mesh.origin.copy()
-    links = link_boundary(mesh)
-    tips = apexes(mesh, length)
-    mesh.kind[boundary_corners(mesh, links, length)] = FIXED
-    mesh.kind[tips] = APEX
-    tree = build_tree(X, origin.reshape(-1, 3), mesh.twin.copy(), parallel)
-    return Reference(tree, X, origin, links)
-
-
-def _connect(
-    V: FloatArray, F: NDArray[np.int32], parallel: bool
-) -> tuple[Ordered, Mesh, BuildReport]:
+def _connect(V: FloatArray, F: NDArray[np.int32], parallel: bool) -> _Connected:
     if not len(F):
         raise MeshInputError("no face of F has three different corners")
     ordered = order_mesh(V, F, parallel)
-    mesh, found = build_mesh(ordered.X, ordered.F)
-    return ordered, mesh, found
+    mesh, found, source = build_mesh(ordered.X, ordered.F)
+    return _Connected(mesh, ordered.face_source, ordered.vertex_source[source], found)
+
+
+def _count_pinched(connected: _Connected) -> int:
+    """Count vertices that hold several fans, but for the ends of edges that were cut."""
+    mesh, source = connected.mesh, connected.vertex_source
+    h = np.flatnonzero(mesh.twin == NONE)
+    ends = source[np.stack([mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]])]
+    edges, count = np.unique(np.sort(ends, axis=0), axis=1, return_counts=True)
+    vertices, fans = np.unique(source, return_counts=True)
+    return len(np.setdiff1d(vertices[fans > 1], edges[:, count > 1]))
 
 
 def _filter(
@@ -166,38 +148,3 @@ def _to_frame(V: FloatArray, used: FloatArray) -> tuple[FloatArray, FloatArray, 
     scale = 2.0 ** min(1000, -floor(log2(extent)))
     with np.errstate(invalid="ignore", over="ignore"):  # vertices that no face uses may be anything
         return np.ascontiguousarray((V - centre) * scale), centre, scale
-
-
-def _positive(L: float) -> float:
-    is_number = isinstance(L, Real) and not isinstance(L, bool | np.bool_)
-    if not is_number or not isfinite(L) or not L > 0.0:
-        raise OptionError(f"L must be a positive length in the units of V; got {L!r}")
-    return float(L)
-
-
-@kernel
-def _measure(mesh):
-    """Total area, mean edge length, number of faces without area."""
-    X = mesh.X
-    area = 0.0
-    edges = 0.0
-    count = 0
-    flat = 0
-    for f in range(mesh.origin.size // 3):
-        a = mesh.origin[3 * f]
-        b = mesh.origin[3 * f + 1]
-        c = mesh.origin[3 * f + 2]
-        nx, ny, nz = face_vector(
-            X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-        )
-        face_area = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
-        area += face_area
-        if face_area == 0.0:
-            flat += 1
-        for h in range(3 * f, 3 * f + 3):
-            if mesh.twin[h] < h:
-                edges += np.sqrt(
-                    distance_squared(X, mesh.origin[h], mesh.origin[following(np.int64(h))])
-                )
-                count += 1
-    return area, edges / count, flat

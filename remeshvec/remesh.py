@@ -1,9 +1,10 @@
-"""Isotropic remeshing [Botsch and Kobbelt 2004]: the sweep and its phases, start to end."""
+"""Isotropic remeshing [Botsch and Kobbelt 2004]: one call, start to end."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import cos, radians
+from dataclasses import dataclass
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -11,41 +12,37 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._check import as_mesh, positive_count
 from ._jit import compile_notice, thread_scope
-from ._types import APEX, INNER, Blocks, FloatArray, Mesh
-from .edge_sets import make_blocks
+from ._types import FloatArray, Mesh
+from .constraints import Constraints, make_constraints
 from .errors import OptionError
-from .operations.collapse import CollapseLimits, collapse_short_edges
-from .operations.fit import fit_vertices
-from .operations.flip import FlipLimits, flip_edges
-from .operations.project import Reference, locate_vertices, project_boundary, project_vertices
-from .operations.relax import RelaxOptions, relax_vertices
-from .operations.split import MAX_ROUNDS, compact, split_long_edges
-from .operations.untangle import untangle_vertices
+from .extract import extract
+from .lengths import Measures, check_gradation, measure, set_lengths
 from .options import Options, make_options
-from .prepare import Prepared, build_reference, choose_length, prepare
+from .prepare import Prepared, prepare
+from .reference import Built, build_reference
 from .report import RemeshResult, Report, Stopwatch
+from .sizing import Adaptive
+from .sweeps import Callback, Sweeps
 
 __all__ = ["remesh"]
 
-Callback = Callable[[int, str, int], Any]
-
-# Below this a parallel region costs more than it saves when another process holds a core.
-_PARALLEL_FACES = 50_000
-
-# Between sweeps, vertices that a walk brings this close to the input, as a share of L, are not checked
-# against the whole of it.
-_TRUST = 0.05
-
 MAX_FACES = 50_000_000
+
+# Tries to meet a number of faces or vertices, and how near is near enough.
+_TRIES = 8
+_NEAR = 0.02
+
+Lengths = float | ArrayLike | Callable[[FloatArray], ArrayLike] | Adaptive
 
 
 def remesh(
     V: ArrayLike,
     F: ArrayLike,
-    L: float | None = None,
+    L: Lengths | None = None,
     *,
     preset: str = "default",
     iterations: int | None = None,
+    tol: float | None = None,
     split: float | Sequence[float] | None = None,
     collapse: float | Sequence[float] | None = None,
     foldover: float | None = None,
@@ -53,6 +50,17 @@ def remesh(
     project: bool | None = None,
     untangle_angle: float | None = None,
     fit: bool | None = None,
+    feature_angle: float | str | None = "auto",
+    feature_edges: ArrayLike | None = None,
+    fixed_vertices: ArrayLike | None = None,
+    fixed_faces: ArrayLike | None = None,
+    face_labels: ArrayLike | None = None,
+    selection: ArrayLike | None = None,
+    boundary: str = "free",
+    gradation: float = 1.5,
+    n_faces: int | None = None,
+    n_vertices: int | None = None,
+    max_deviation: float | None = None,
     threads: int | None = None,
     max_faces: int = MAX_FACES,
     callback: Callback | None = None,
@@ -60,8 +68,9 @@ def remesh(
     """Remesh a surface to well-shaped triangles with edges of length ``L``.
 
     Every sweep splits long edges, collapses short ones, flips edges towards valence 6 and relaxes
-    vertices in their tangent planes; the last sweeps project vertices onto the input. The result is
-    the same, bit for bit, on any number of threads.
+    vertices in their tangent planes; the last sweeps project vertices onto the input. Creases,
+    boundaries and other curves keep their place: their vertices slide along them, their corners stay.
+    The result is the same, bit for bit, on any number of threads.
 
     Parameters
     ----------
@@ -69,15 +78,20 @@ def remesh(
         Vertices; any array-like, never modified.
     F : (m, 3) int
         Triangles as 0-based indices; any array-like, never modified. Boundaries, several components
-        and any genus are welcome; degenerate, duplicate and unreferenced elements, non-manifold
-        edges and inconsistent winding are handled and listed in ``report.dirt``.
-    L : float, optional
-        Target edge length in the units of ``V``; 0.9 times the mean edge length by default.
+        and any genus are welcome, edges of three faces and more too: sheets share their vertices on
+        such edges before and after. Degenerate, duplicate and unreferenced elements, inconsistent
+        winding and pinched vertices are handled and listed in ``report.dirt``.
+    L : float, (n,) array, callable or Adaptive, optional
+        Target edge length in the units of ``V``: for all edges, at each input vertex, as a function of
+        points (k, 3), or from the curvature. 0.9 times the mean edge length by default.
     preset : {"default", "fast", "fine"}
         ``"default"``: twelve sweeps with loosening thresholds, vertices on the input. ``"fast"``: the
         published algorithm, five sweeps. ``"fine"``: sixteen sweeps and the fit.
     iterations : int, optional
-        Sweeps; threshold schedules are stretched over them.
+        Sweeps at most; threshold schedules are stretched over them.
+    tol : float, optional
+        Stop after a sweep that changed less than this share of the edges and moved vertices by less
+        than ``tol * L`` (root mean square). By default all sweeps are run.
     split, collapse : float or sequence of float, optional
         Edges longer than ``split * L`` are split, shorter than ``collapse * L`` collapsed; a sequence
         gives one factor a sweep. 4/3 and 4/5 in the paper.
@@ -95,6 +109,32 @@ def remesh(
     fit : bool, optional
         Let vertices leave the input by up to 0.2 L so that faces straddle it: less RMS
         distance. On in ``"fine"``.
+    feature_angle : "auto", float or None
+        Which creases to keep. ``"auto"``: those that turn more than their surroundings at the scale of
+        ``L``, so that a part keeps its edges and a scan does not freeze its noise. Degrees: all edges
+        whose faces turn by more. None: no creases.
+    feature_edges : (k, 2) int, optional
+        Edges of the input, as vertices, to keep as creases.
+    fixed_vertices : (k,) int, optional
+        Input vertices that stay, bit for bit; ``vertex_map`` tells where they went.
+    fixed_faces : (k,) int or (m,) bool, optional
+        Input faces that stay, bit for bit; ``face_map`` tells where they went.
+    face_labels : (m,) int, optional
+        Borders between labels are kept as creases, and every new face gets its label.
+    selection : (k,) int or (m,) bool, optional
+        Input faces to remesh. All others stay, and come first in the result, in their order.
+    boundary : {"free", "split", "fixed"}
+        ``"free"``: boundary vertices slide along the boundary of the input, corners stay. ``"split"``:
+        boundary vertices of the input stay, long edges between them are split. ``"fixed"``: boundary
+        edges stay.
+    gradation : float
+        Largest ratio of the target lengths at the ends of an edge, where ``L`` varies.
+    n_faces, n_vertices : int, optional
+        Number of faces or vertices instead of ``L``, met within 2 % where the shape allows it;
+        ``report.stop`` says where it does not.
+    max_deviation : float, optional
+        Largest distance between input and result, both ways, in the units of ``V``. Edges become
+        shorter than ``L`` where that needs it. See ``report.deviation`` for what was measured.
     threads : int, optional
         Threads to use at most; all by default. Meshes below 50,000 faces use one.
     max_faces : int
@@ -106,7 +146,7 @@ def remesh(
     Returns
     -------
     RemeshResult
-        Unpacks as ``V2, F2``; holds birth faces, barycentric coordinates and a report too.
+        Unpacks as ``V2, F2``; holds births, labels, features, maps and a report too.
 
     Raises
     ------
@@ -124,6 +164,7 @@ def remesh(
         preset,
         {
             "iterations": iterations,
+            "tol": tol,
             "split": split,
             "collapse": collapse,
             "foldover": foldover,
@@ -131,154 +172,169 @@ def remesh(
             "project": project,
             "untangle_angle": untangle_angle,
             "fit": fit,
+            "max_deviation": max_deviation,
             "threads": threads,
         },
     )
-    max_faces = positive_count(max_faces, "max_faces")
+    count = _wanted_count(L, n_faces, n_vertices)
+    sizing = Sizing(L, check_gradation(gradation), positive_count(max_faces, "max_faces"))
     if callback is not None and not callable(callback):
         raise OptionError(f"callback must be callable; got {callback!r}")
     with watch.time("check"):
         vertices, faces = as_mesh(V, F)
+        constraints = make_constraints(
+            len(vertices),
+            faces,
+            feature_angle=feature_angle,
+            boundary=boundary,
+            feature_edges=feature_edges,
+            fixed_vertices=fixed_vertices,
+            fixed_faces=fixed_faces,
+            face_labels=face_labels,
+            selection=selection,
+        )
     with compile_notice(), thread_scope(options.threads) as may_run:
-        run = _Run(options, watch, may_run, callback)
+        sweeps = Sweeps(options, watch, may_run, callback)
         with watch.time("build"):
-            prepared = prepare(vertices, faces, run.is_parallel(len(faces)))
-            length = choose_length(prepared, L, max_faces)
-        with watch.time("reference"):
-            reference = build_reference(prepared.mesh, length, run.is_parallel(len(faces)))
-        mesh = run.sweep_all(prepared.mesh, reference, length)
-        mesh, barycentric = run.finish(mesh, reference, length)
+            prepared = prepare(vertices, faces, sweeps.is_parallel(len(faces)))
+        sweeps.scale = prepared.scale
+        job = _Job(prepared, measure(prepared), constraints, vertices, sizing, sweeps)
+        done = job.run() if count is None else _meet_count(job, *count)
     with watch.time("extract"):
-        V2, F2 = _extract(mesh, prepared, np.asarray(V).dtype, np.asarray(F).dtype)
-        birth = prepared.face_source[mesh.birth // 3].astype(np.int64)
+        out = extract(
+            done.mesh, done.barycentric, prepared, done.built, constraints, vertices, len(faces)
+        )
+        V2 = out.V.astype(_vertex_dtype(V))
+        F2 = out.F.astype(_face_dtype(F, len(V2)))
     report = Report(
-        length / prepared.scale, options, run.sweeps, watch.stop(), run.stop, prepared.dirt,
-        before=(V, F), after=(V2, F2),
+        done.length, options, sweeps.counts, watch.stop(), sweeps.stop, prepared.dirt,
+        done.built.counts, sweeps.deviation, before=(V, F), after=(V2, F2),
     )  # fmt: skip
-    return RemeshResult(V2, F2, birth, barycentric, report)
+    return RemeshResult(
+        V2, F2, out.birth_face, out.birth_barycentric, report, out.face_labels, out.vertex_map,
+        out.face_map, out.feature_edges, out.corners, out.lengths,
+    )  # fmt: skip
 
 
-def _extract(
-    mesh: Mesh, prepared: Prepared, vertex_dtype: np.dtype[Any], face_dtype: np.dtype[Any]
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Arrays in the caller's units and dtypes.
+@dataclass(frozen=True)
+class Sizing:
+    """What the caller says about sizes, checked as far as it can be without the mesh."""
 
-    Integer coordinates come back as float64, indices too many for the caller's dtype as int64.
-    """
-    V = mesh.X[:, :3] / prepared.scale + prepared.centre
-    F = mesh.origin.reshape(-1, 3)
-    if face_dtype.kind not in "iu" or len(V) - 1 > np.iinfo(face_dtype).max:
-        face_dtype = np.dtype(np.int64)
-    return V.astype(vertex_dtype if vertex_dtype.kind == "f" else np.float64), F.astype(face_dtype)
+    L: Lengths | None
+    gradation: float
+    max_faces: int
 
 
-class _Run:
-    """The sweeps of one call: options in, counts and seconds out."""
+@dataclass(frozen=True)
+class _Done:
+    """A remeshed surface in the frame of `Prepared`."""
 
-    def __init__(
-        self, options: Options, watch: Stopwatch, may_run: bool, callback: Callback | None
-    ) -> None:
-        self.options = options
-        self.watch = watch
-        self.may_run = may_run
-        self.callback = callback
-        self.sweeps: list[dict[str, int]] = []
-        self.stop = "all sweeps done"
+    mesh: Mesh
+    barycentric: FloatArray
+    built: Built
+    length: float  # of the mean new edge, in the units of the input
 
-    def is_parallel(self, n_faces: int) -> bool:
-        """Tell whether a mesh of so many faces is worth more than one thread."""
-        return self.may_run and n_faces >= _PARALLEL_FACES
+    def count(self, noun: str) -> int:
+        """Count faces or vertices."""
+        return len(self.mesh.origin) // 3 if noun == "faces" else len(self.mesh.X)
 
-    def sweep_all(self, mesh: Mesh, reference: Reference, length: float) -> Mesh:
-        """Run all sweeps, or until the callback ends them."""
-        blocks = make_blocks(mesh)
-        for sweep in range(self.options.iterations):
-            self.sweeps.append({})
-            mesh, blocks = self._split(mesh, blocks, self.options.split[sweep] * length)
-            if not self._is_cancelled(sweep, "split"):
-                self._improve(mesh, blocks, reference, length, sweep)
-            if self.stop == "cancelled":
-                break
-        return mesh
+    def count_held(self) -> int:
+        """Count faces that had to stay."""
+        return 0 if self.built.held is None else int(self.built.held.sum())
 
-    def _split(self, mesh: Mesh, blocks: Blocks, longest: float) -> tuple[Mesh, Blocks]:
-        """Split by rounds until no edge is too long."""
-        count = 0
-        with self.watch.time("split"):
-            for _ in range(MAX_ROUNDS):
-                parallel = self.is_parallel(mesh.origin.size // 3)
-                mesh, n_split = split_long_edges(mesh, blocks, longest, parallel)
-                if not n_split:
-                    break
-                blocks = make_blocks(mesh)
-                count += n_split
-        self.sweeps[-1]["split"] = count
-        return mesh, blocks
 
-    def _improve(
-        self, mesh: Mesh, blocks: Blocks, reference: Reference, length: float, sweep: int
-    ) -> None:
-        """Run the phases that change the mesh in place."""
-        options = self.options
-        left = options.iterations - sweep
-        parallel = self.is_parallel(mesh.origin.size // 3)
-        limits = CollapseLimits(
-            options.collapse[sweep] * length,
-            options.split[sweep] * length,
-            options.foldover_cosine,
-            options.quadric_reach * length,
-            options.sliver_check,
+@dataclass(frozen=True)
+class _Job:
+    """One prepared mesh, to be remeshed with one length or several."""
+
+    prepared: Prepared
+    measures: Measures
+    constraints: Constraints
+    V: FloatArray
+    sizing: Sizing
+    sweeps: Sweeps
+
+    def run(self, L: float | None = None) -> _Done:
+        """Remesh a copy of the mesh."""
+        prepared = self.prepared._replace(mesh=self.prepared.copy_mesh())
+        mesh, watch = prepared.mesh, self.sweeps.watch
+        constraints, sizing = self.constraints, self.sizing
+        with watch.time("reference"):
+            hard = constraints.hard_edges(mesh, prepared.vertex_source, prepared.face_source)
+            length = set_lengths(
+                prepared,
+                self.measures,
+                self.V,
+                sizing.L if L is None else L,
+                hard,
+                constraints.feature_angle,
+                sizing.gradation,
+                sizing.max_faces,
+            )
+            built = build_reference(
+                mesh,
+                prepared.vertex_source,
+                constraints,
+                hard,
+                constraints.held_faces(prepared.face_source),
+                self._fixed(),
+                self.sweeps.is_parallel(len(mesh.origin) // 3),
+            )
+        mesh = self.sweeps.run(mesh, built)
+        mesh, barycentric = self.sweeps.finish(mesh, built)
+        return _Done(mesh, barycentric, built, length / prepared.scale)
+
+    def _fixed(self) -> NDArray[np.bool_]:
+        """Vertices of the mesh that the caller wants to stay."""
+        is_fixed = np.zeros(len(self.V), np.bool_)
+        vertices = self.constraints.fixed_vertices
+        is_fixed[vertices if self.prepared.same is None else self.prepared.same[vertices]] = True
+        return is_fixed[self.prepared.vertex_source]
+
+
+def _wanted_count(L: Any, n_faces: Any, n_vertices: Any) -> tuple[str, int] | None:
+    """Return what to count and how many are wanted, None for a length."""
+    given = {"L": L, "n_faces": n_faces, "n_vertices": n_vertices}
+    named = [name for name, value in given.items() if value is not None]
+    if len(named) > 1:
+        raise OptionError(f"{' and '.join(named)} exclude each other; give one of them")
+    if n_faces is not None:
+        return "faces", positive_count(n_faces, "n_faces")
+    return None if n_vertices is None else ("vertices", positive_count(n_vertices, "n_vertices"))
+
+
+def _meet_count(job: _Job, noun: str, wanted: int) -> _Done:
+    """Remesh with one length after another until the count is met within 2 %."""
+    faces = wanted if noun == "faces" else 2 * wanted
+    if faces > job.sizing.max_faces:
+        raise OptionError(f"n_{noun} = {wanted:,} is more than max_faces = {job.sizing.max_faces:,}")
+    L = sqrt(job.measures.area / faces / (sqrt(3.0) / 4.0)) / job.prepared.scale
+    best = None
+    for _ in range(_TRIES):
+        done = job.run(L)
+        count = done.count(noun)
+        if best is None or abs(count - wanted) < abs(best.count(noun) - wanted):
+            best = done
+        held = done.count_held() // (1 if noun == "faces" else 2)
+        if abs(count - wanted) <= _NEAR * wanted or job.sweeps.stop == "cancelled":
+            break
+        L *= min(2.0, max(0.5, sqrt(max(count - held, 1) / max(wanted - held, 1))))
+    assert best is not None
+    count = best.count(noun)
+    if abs(count - wanted) > _NEAR * wanted:
+        job.sweeps.stop += (
+            f"; {count:,} {noun} are as near to {wanted:,} as {_TRIES} tries came"
         )
-        with self.watch.time("collapse"):
-            tally = collapse_short_edges(mesh, blocks, limits, parallel)
-            self.sweeps[-1]["collapse"] = int(tally[0])
-        if self._is_cancelled(sweep, "collapse"):
-            return
-        flips = FlipLimits(
-            cos(radians(options.flip_normal)), options.delaunay_ties, options.sliver_check
-        )
-        with self.watch.time("flip"):
-            for _ in range(options.flip_passes):
-                tally = flip_edges(mesh, blocks, flips, parallel)
-                self.sweeps[-1]["flip"] = self.sweeps[-1].get("flip", 0) + int(tally[0])
-        if self._is_cancelled(sweep, "flip"):
-            return
-        relax = RelaxOptions(options.stiffness, options.project)
-        with self.watch.time("relax"):
-            for _ in range(options.last_relaxations if left == 1 else 1):
-                relax_vertices(mesh, blocks, relax, parallel)
-        with self.watch.time("project"):
-            if options.project and left <= options.projected_sweeps:
-                project_vertices(mesh, blocks, reference, _TRUST * length, parallel)
-            elif options.project:
-                project_boundary(mesh, blocks, reference, parallel)
-        self._is_cancelled(sweep, "relax")
+    return best
 
-    def finish(self, mesh: Mesh, reference: Reference, length: float) -> tuple[Mesh, FloatArray]:
-        """Untangle, fit, and find where on the input every vertex lies."""
-        options = self.options
-        parallel = self.is_parallel(mesh.origin.size // 3)
-        with self.watch.time("extract"):
-            mesh = compact(mesh, make_blocks(mesh), parallel)
-            blocks = make_blocks(mesh)
-            mesh.kind[mesh.kind == APEX] = INNER
-        with self.watch.time("finish"):
-            if options.project:
-                project_vertices(mesh, blocks, reference, 0.0, parallel)
-            cosine = cos(radians(options.untangle_angle))
-            for _ in range(options.untangle_rounds):
-                untangle_vertices(mesh, blocks, reference.tree, options.project, cosine, parallel)
-            for _ in range(options.fit_rounds):
-                fit_vertices(mesh, blocks, reference.tree, 0.2 * length, parallel)
-        with self.watch.time("locate"):
-            is_on_input = options.project and not options.fit_rounds
-            trust = np.inf if is_on_input else _TRUST * length
-            barycentric = locate_vertices(mesh, blocks, reference, trust, parallel)
-        return mesh, barycentric
 
-    def _is_cancelled(self, sweep: int, phase: str) -> bool:
-        if self.callback is None:
-            return False
-        if self.callback(sweep, phase, self.sweeps[-1].get(phase, 0)) is False:
-            self.stop = "cancelled"
-        return self.stop == "cancelled"
+def _vertex_dtype(V: ArrayLike) -> np.dtype[Any]:
+    """Return the caller's dtype; coordinates that were whole numbers come back as float64."""
+    dtype = np.asarray(V).dtype
+    return dtype if dtype.kind == "f" else np.dtype(np.float64)
+
+
+def _face_dtype(F: ArrayLike, n: int) -> np.dtype[Any]:
+    """Return the caller's dtype, or int64 where that does not reach."""
+    dtype = np.asarray(F).dtype
+    return dtype if dtype.kind in "iu" and n - 1 <= np.iinfo(dtype).max else np.dtype(np.int64)

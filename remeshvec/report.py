@@ -68,6 +68,14 @@ class Report:
         Why the sweeps ended.
     dirt : dict
         What was wrong with the input, and how often; empty for a clean mesh.
+    features : dict
+        Creases of the input that are kept: "crease_edges", "chains", "corners", and how many edges the
+        rule of ``feature_angle="auto"`` dropped: "dropped_echo", "dropped_noise", "dropped_short".
+    deviation : dict
+        With ``max_deviation``, the largest distance found: "to_input" from samples of the result (ten a
+        face: its corners, the middles of its edges, four points inside) to the input, and "from_input"
+        from such samples of the input to the result. No sample may exceed 0.9 times the bound; what
+        lies between samples is not looked at.
     """
 
     target_length: float
@@ -76,6 +84,8 @@ class Report:
     seconds: dict[str, float]
     stop: str
     dirt: dict[str, int]
+    features: dict[str, int]
+    deviation: dict[str, float]
     before: tuple[ArrayLike, ArrayLike] = field(repr=False)
     after: tuple[ArrayLike, ArrayLike] = field(repr=False)
 
@@ -104,6 +114,8 @@ class Report:
             "seconds": self.seconds,
             "stop": self.stop,
             "dirt": self.dirt,
+            "features": self.features,
+            "deviation": self.deviation,
             "quality_before": self.quality_before.to_dict(),
             "quality_after": self.quality_after.to_dict(),
         }
@@ -126,6 +138,18 @@ class RemeshResult:
         that lie on the input; otherwise that is the point of the input closest to the vertex, among
         those that a walk over the input sees where it ends within 0.05 L.
     report : Report
+    face_labels : (m,) int, or None
+        Label of every face, where the input had labels.
+    vertex_map : (n_in,) int64
+        For every input vertex the output vertex that is the same, held bit for bit; -1 for none.
+    face_map : (m_in,) int64
+        For every input face that had to stay the output face; -1 for the others.
+    feature_edges : (k, 2) int64
+        Edges on creases, boundaries, borders of labels, and where sheets meet.
+    corners : (k,) int64
+        Vertices that did not move.
+    lengths : (n,) float64
+        Target edge length at every vertex.
     """
 
     V: NDArray[Any]
@@ -133,6 +157,12 @@ class RemeshResult:
     birth_face: NDArray[np.int64]
     birth_barycentric: NDArray[np.float64]
     report: Report
+    face_labels: NDArray[Any] | None
+    vertex_map: NDArray[np.int64]
+    face_map: NDArray[np.int64]
+    feature_edges: NDArray[np.int64]
+    corners: NDArray[np.int64]
+    lengths: NDArray[np.float64]
 
     def __iter__(self) -> Iterator[NDArray[Any]]:
         return iter((self.V, self.F))

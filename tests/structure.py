@@ -4,29 +4,82 @@ from __future__ import annotations
 
 import numpy as np
 import topology
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
-from remeshvec._types import APEX, BOUNDARY, DEAD, FIXED, INNER, NONE, Blocks, Mesh, Tree
+from remeshvec._types import (
+    CURVE,
+    DEAD,
+    FIXED,
+    FROZEN,
+    HELD,
+    INNER,
+    NONE,
+    SEAM,
+    Blocks,
+    Mesh,
+    Tree,
+)
 from remeshvec.bvh import build_tree
+from remeshvec.constraints import make_constraints
 from remeshvec.edge_sets import make_blocks
 from remeshvec.halfedge import build_mesh
-from remeshvec.operations.project import locate_vertices, project_vertices
+from remeshvec.operations.project import Reference, locate_vertices, project_vertices
 from remeshvec.order import order_mesh
+from remeshvec.reference import Built, build_reference
 
 
-def built(V, F, ordered: bool = False) -> Mesh:
+def built(V, F, ordered: bool = False, length: float = 1.0) -> Mesh:
     """Half-edge mesh of clean arrays, vertices and faces as they come (or in Morton order)."""
     V, F = np.asarray(V, dtype=float), np.asarray(F, dtype=np.int32)
     if ordered:
         X, F, *_ = order_mesh(V, F, False)
     else:
         X = np.column_stack([V, np.zeros(len(V))])
-    mesh, _ = build_mesh(X, F)
+    mesh, *_ = build_mesh(X, F)
+    mesh.X[:, 3] = length
     mesh.birth[:] = mesh.vertex_halfedge
     return mesh
 
 
+def cut_open(V, F) -> tuple[Mesh, np.ndarray]:
+    """Half-edge mesh of a surface with edges of three faces and more; where its vertices come from."""
+    X = np.column_stack([np.asarray(V, float), np.ones(len(V))])
+    mesh, _, source = build_mesh(X, np.asarray(F, np.int32))
+    mesh.birth[:] = mesh.vertex_halfedge
+    return mesh, source
+
+
 def tree_of(mesh: Mesh, parallel: bool = False) -> Tree:
-    return build_tree(mesh.X, mesh.origin.reshape(-1, 3), mesh.twin, parallel)
+    patch = np.zeros(mesh.origin.size // 3, np.int32)
+    return build_tree(mesh.X, mesh.origin.reshape(-1, 3), mesh.twin, patch, parallel)
+
+
+def featured(
+    mesh: Mesh, length: float | None = None, vertex_source=None, parallel: bool = False, **wanted
+) -> Built:
+    """Find and mark the features of a mesh: all that `build_reference` returns.
+
+    ``wanted`` are the keywords of `make_constraints`, in terms of this mesh's vertices and faces; no
+    creases unless ``feature_angle`` is among them. ``length`` None leaves the lengths as they are.
+    """
+    n, F = len(mesh.X), mesh.origin.reshape(-1, 3)
+    if length is not None:
+        mesh.X[:, 3] = length
+    if vertex_source is None:
+        vertex_source = np.arange(n, dtype=np.int32)
+    constraints = make_constraints(n, F.astype(np.int64), **{"feature_angle": None, **wanted})
+    faces = np.arange(len(F))
+    hard = constraints.hard_edges(mesh, np.arange(n, dtype=np.int32), faces)
+    held = constraints.held_faces(faces)
+    fixed = np.zeros(n, bool)
+    fixed[constraints.fixed_vertices] = True
+    return build_reference(mesh, vertex_source, constraints, hard, held, fixed, parallel)
+
+
+def referenced(mesh: Mesh, length: float | None = None, **wanted) -> Reference:
+    """Only the reference surface of `featured`."""
+    return featured(mesh, length, **wanted).reference
 
 
 def project(mesh: Mesh, reference, blocks: Blocks | None = None, parallel: bool = False) -> None:
@@ -75,6 +128,8 @@ def assert_same_bits(one: Mesh, two: Mesh) -> None:
     assert np.array_equal(one.origin, two.origin)
     alive = one.origin != DEAD
     assert np.array_equal(one.twin[alive], two.twin[alive])
+    assert np.array_equal(one.curve[alive], two.curve[alive])
+    assert np.array_equal(one.source[alive[::3]], two.source[alive[::3]])
     assert np.array_equal(one.vertex_halfedge, two.vertex_halfedge)
     used = one.vertex_halfedge != DEAD
     assert np.array_equal(one.valence_excess[used], two.valence_excess[used])
@@ -89,7 +144,8 @@ def assert_valid(mesh: Mesh, slits: bool = False) -> None:
     ``slits`` allows an edge whose two sides are boundaries, which a cut leaves.
     """
     m, n = mesh.origin.size // 3, mesh.vertex_halfedge.size
-    assert mesh.origin.shape == mesh.twin.shape == (3 * m,)
+    assert mesh.origin.shape == mesh.twin.shape == mesh.curve.shape == (3 * m,)
+    assert mesh.source.shape == (m,) and mesh.source.min() >= 0
     assert mesh.X.shape == (n, 4) and mesh.X.dtype == np.float64
     assert mesh.valence_excess.shape == mesh.kind.shape == mesh.birth.shape == (n,)
     origin, twin = mesh.origin.tolist(), mesh.twin.tolist()
@@ -118,7 +174,12 @@ def assert_valid(mesh: Mesh, slits: bool = False) -> None:
     used = np.zeros(n, bool)
     used[list(outgoing)] = True
     assert ((mesh.vertex_halfedge != DEAD) == used).all(), "dead vertices"
-    assert np.isfinite(mesh.X[used, :3]).all()
+    assert np.isfinite(mesh.X[used]).all() and (mesh.X[used, 3] > 0).all()
+    on_curve = mesh.curve != NONE
+    inner = np.flatnonzero((mesh.origin != DEAD) & (mesh.twin != NONE))
+    assert (on_curve[inner] == on_curve[mesh.twin[inner]]).all(), "a curve on one side only"
+    assert (mesh.curve[inner] == mesh.curve[mesh.twin[inner]]).all(), "sides on different curves"
+    assert on_curve[(mesh.origin != DEAD) & (mesh.twin == NONE)].all(), "a boundary off all curves"
     for v, leaving in outgoing.items():
         open_ones = [h for h in leaving if twin[h] == NONE]
         start = int(mesh.vertex_halfedge[v])
@@ -128,8 +189,47 @@ def assert_valid(mesh: Mesh, slits: bool = False) -> None:
         assert walk(origin, twin, start) == sorted(leaving), f"vertex {v} is no single fan"
         valence = len(leaving) + len(open_ones)
         assert mesh.valence_excess[v] == valence - (4 if open_ones else 6), f"valence of {v}"
-        kinds = (BOUNDARY, FIXED) if open_ones else (INNER, APEX, FIXED)
+        at_curve = sum(on_curve[h] for h in leaving) + len(open_ones)
+        assert at_curve == 2 or mesh.kind[v] != CURVE, f"vertex {v} ends or joins curves"
+        kinds = (CURVE, FIXED) if at_curve else (INNER, HELD, FIXED)
         assert mesh.kind[v] in kinds, f"kind of {v}"
+
+
+def assert_on_reference(mesh: Mesh, reference: Reference) -> None:
+    """Check that vertices, faces and edges know where they belong: on the same curve, in one patch."""
+    chain = chains_of(reference)
+    patch = reference.tree.patch
+    alive = np.flatnonzero(mesh.origin != DEAD)
+    on_curve = alive[mesh.curve[alive] >= 0]
+    names = mesh.curve[on_curve] & (SEAM - 1)
+    assert (reference.tree.twin[names] == NONE).all(), "an edge on a curve that does not exist"
+    inside = alive[(mesh.curve[alive] == NONE) & (mesh.twin[alive] != NONE)]
+    own, across = patch[mesh.source[inside // 3]], patch[mesh.source[mesh.twin[inside] // 3]]
+    assert (own == across).all(), "faces beside an inner edge in different patches"
+    for h in alive.tolist():
+        v = mesh.origin[h]
+        if mesh.kind[v] in (INNER, HELD):
+            here = patch[mesh.birth[v] // 3]
+            assert here == patch[mesh.source[h // 3]], f"vertex {v} was born in another patch"
+    for h, name in zip(on_curve.tolist(), names.tolist(), strict=True):
+        for v in (mesh.origin[h], mesh.origin[next_of(h)]):
+            if mesh.kind[v] == CURVE:
+                assert chain[mesh.birth[v]] == chain[name], f"vertex {v} was born on another curve"
+            else:
+                assert mesh.kind[v] == FIXED, f"vertex {v} on a curve"
+    frozen = alive[mesh.curve[alive] == FROZEN]
+    ends = mesh.origin[np.concatenate([frozen, [next_of(h) for h in frozen.tolist()]]).astype(int)]
+    assert (mesh.kind[ends] == FIXED).all(), "a frozen edge with an end that may move"
+
+
+def chains_of(reference: Reference) -> np.ndarray:
+    """Equal numbers for edges of the same polyline, by their names."""
+    h = np.arange(len(reference.origin))
+    if not reference.beside.shape[1]:
+        return h
+    pairs = np.array([(i, j) for side in reference.beside for i, j in enumerate(side) if j != NONE])
+    graph = coo_matrix((np.ones(len(pairs)), pairs.reshape(-1, 2).T), shape=(len(h), len(h)))
+    return connected_components(graph, directed=False)[1]
 
 
 def next_of(h: int) -> int:

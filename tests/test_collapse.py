@@ -17,10 +17,10 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import APEX, BOUNDARY, DEAD, FIXED, INNER
+from remeshvec._types import HELD, CURVE, DEAD, FIXED, INNER
 from remeshvec.operations.collapse import (
     COLLAPSED,
-    KEPT_BOUNDARY,
+    KEPT_CURVE,
     KEPT_FOLDOVER,
     KEPT_LINK,
     KEPT_OVERSHOOT,
@@ -29,8 +29,8 @@ from remeshvec.operations.collapse import (
     RING_CAPACITY,
     CollapseLimits,
     collapse_short_edges,
-    keeps_boundary,
 )
+from remeshvec.operations.guards import keeps_curves
 
 
 def limits(shortest, **changes):
@@ -104,7 +104,7 @@ def test_boundary_collapses_keep_kinds_and_places():
     wall = next(w for w in naive.neighbours(F)[inner] & rim if V[w, 0] == V[inner, 0])
     mesh = built(pulled(V, wall, inner), F)
     assert_only(outcomes(mesh, 0.2), COLLAPSED)
-    assert mesh.vertex_halfedge[inner] == DEAD and mesh.kind[wall] == BOUNDARY
+    assert mesh.vertex_halfedge[inner] == DEAD and mesh.kind[wall] == CURVE
     assert np.array_equal(mesh.X[wall, :3], V[wall])
     assert_valid(mesh)
 
@@ -203,7 +203,7 @@ def test_guards_of_topology_agree_with_the_link_condition(name):
     for a, b in sorted(map(sorted, naive.edges(F)))[:60]:
         mesh = built(pulled(V, a, b, 1e-6), F)
         tally = outcomes(mesh, 2e-6)
-        refused = tally[KEPT_LINK] + tally[KEPT_BOUNDARY] > 0
+        refused = tally[KEPT_LINK] + tally[KEPT_CURVE] > 0
         too_many = max(len(naive.neighbours(F)[v]) for v in (a, b)) >= RING_CAPACITY - 1
         assert refused == (not naive.link_condition(F, a, b)) or too_many, (a, b)
 
@@ -216,14 +216,14 @@ def test_boundary_guard_bridge():
     common = naive.neighbours(F)[a] & naive.neighbours(F)[b]
     assert len(common) == 2  # a link condition without the boundary is content
     assert not zoo.is_vertex_manifold(naive.collapse(F, a, b))
-    assert_only(outcomes(built(pulled(V, a, b, 1e-3), F), 2e-3), KEPT_BOUNDARY)
+    assert_only(outcomes(built(pulled(V, a, b, 1e-3), F), 2e-3), KEPT_CURVE)
 
 
 def test_boundary_guard_lone_face():
     V, F = zoo.triangle()
     mesh = built(pulled(V, 0, 1), F)
-    assert_only(outcomes(mesh, 0.2), KEPT_BOUNDARY)
-    assert not keeps_boundary(mesh, half_edge(mesh, 0, 1), 0, 1)
+    assert_only(outcomes(mesh, 0.2), KEPT_CURVE)
+    assert not keeps_curves(mesh, half_edge(mesh, 0, 1), 0, 1)
 
 
 def test_two_fixed_vertices_stay_apart():
@@ -231,10 +231,10 @@ def test_two_fixed_vertices_stay_apart():
     a, b = sorted(sorted(naive.boundary_edges(F), key=sorted)[0])
     mesh = built(pulled(V, a, b), F)
     mesh.kind[[a, b]] = FIXED
-    assert_only(outcomes(mesh, 0.2), KEPT_BOUNDARY)
+    assert_only(outcomes(mesh, 0.2), KEPT_CURVE)
 
 
-@pytest.mark.parametrize("kind", [INNER, APEX, FIXED])
+@pytest.mark.parametrize("kind", [INNER, HELD, FIXED])
 def test_tips_stay_where_they_are(kind):
     """A tip swallows inner vertices, and no other kind swallows a tip."""
     V, F = zoo.grid()
@@ -245,10 +245,10 @@ def test_tips_stay_where_they_are(kind):
     )
     for tip, other in (inner_edge, inner_edge[::-1]):
         mesh = built(pulled(V, a, b), F)
-        mesh.kind[tip], mesh.kind[other] = APEX, kind
+        mesh.kind[tip], mesh.kind[other] = HELD, kind
         place = mesh.X[tip].copy()
-        assert_only(outcomes(mesh, 0.2), COLLAPSED if kind == INNER else KEPT_BOUNDARY)
-        assert mesh.kind[tip] == APEX and np.array_equal(mesh.X[tip], place)
+        assert_only(outcomes(mesh, 0.2), COLLAPSED if kind == INNER else KEPT_CURVE)
+        assert mesh.kind[tip] == HELD and np.array_equal(mesh.X[tip], place)
         assert mesh.vertex_halfedge[tip] != DEAD
 
 

@@ -116,7 +116,7 @@ def alone(mesh, a, b):
 def restore(mesh):
     from remeshvec.halfedge import build_mesh
 
-    fresh, _ = build_mesh(mesh.X.copy(), mesh.origin.reshape(-1, 3).copy())
+    fresh, *_ = build_mesh(mesh.X.copy(), mesh.origin.reshape(-1, 3).copy())
     mesh.valence_excess[:] = fresh.valence_excess
 
 

@@ -7,7 +7,7 @@ import topology
 import zoo
 from structure import assert_same_bits, assert_valid, built, copied, faces_of, half_edge, walk
 
-from remeshvec._types import BOUNDARY, DEAD, FIXED, INNER, NONE
+from remeshvec._types import CURVE, DEAD, FIXED, INNER, NONE
 from remeshvec.edge_sets import make_blocks
 from remeshvec.halfedge import build_mesh, following, previous
 from remeshvec.operations.split import compact
@@ -17,10 +17,16 @@ TINY = ["triangle", "square", "tetrahedron", "octahedron", "sliver_fan"]
 
 
 def build_dirty(V, F):
-    """Build as `prepare` does, but keep duplicates; returns the mesh, the report, and sources."""
+    """Build as `prepare` does, but keep duplicates; returns the mesh, the report, and the order."""
     F = np.asarray(F)[[len(set(f)) == 3 for f in np.asarray(F).tolist()]]
     ordered = order_mesh(np.asarray(V, float), F.astype(np.int32), False)
-    return *build_mesh(ordered.X, ordered.F), ordered
+    mesh, found, source = build_mesh(ordered.X, ordered.F)
+    mesh.X[:, 3] = 1.0
+    # Every vertex is a copy of the one that it comes from; the first copy keeps its number.
+    assert np.array_equal(mesh.X[:, :3], ordered.X[source, :3])
+    assert np.array_equal(source[: len(ordered.X)], np.arange(len(ordered.X)))
+    assert np.array_equal(source[faces_of(mesh)], ordered.F)
+    return mesh, found, ordered
 
 
 def test_following_and_previous_stay_in_the_face():
@@ -33,17 +39,21 @@ def test_following_and_previous_stay_in_the_face():
 @pytest.mark.parametrize("name", zoo.TIDY)
 def test_tidy_meshes_are_connected_as_they_are(name):
     V, F = zoo.ZOO[name].make()
-    mesh, found = build_mesh(np.column_stack([V, V[:, 0]]), F.astype(np.int32))
+    mesh, found, source = build_mesh(np.column_stack([V, 1 + 0 * V[:, 0]]), F.astype(np.int32))
     assert_valid(mesh)
     assert not any(found)
     assert np.array_equal(faces_of(mesh), F)
     assert np.array_equal(mesh.X[:, :3], V)
+    assert np.array_equal(source, np.arange(len(V)))
+    assert np.array_equal(mesh.source, np.arange(len(F)))
     assert mesh.twin.tolist() == naive.twins(F)
     ring, ideal = naive.neighbours(F), naive.ideal_valence(F)
     assert [len(ring[v]) - ideal[v] for v in range(len(V))] == mesh.valence_excess.tolist()
     rim = {v for edge in naive.boundary_edges(F) for v in edge}
-    assert [v in rim for v in range(len(V))] == (mesh.kind == BOUNDARY).tolist()
+    assert [v in rim for v in range(len(V))] == (mesh.kind == CURVE).tolist()
     assert (mesh.kind[sorted(set(range(len(V))) - rim)] == INNER).all()
+    h = np.arange(mesh.origin.size)
+    assert np.array_equal(mesh.curve, np.where(mesh.twin == NONE, h, NONE))
 
 
 @pytest.mark.parametrize("name", ["annulus", "genus_2", "planar_delaunay"])
@@ -91,22 +101,26 @@ def test_dirty_meshes_become_oriented_manifolds(name):
         assert found.pinched_vertices > 0
 
 
-def test_an_edge_of_three_faces_is_cut_and_fixed():
+def test_an_edge_of_three_faces_is_cut():
+    """Into three boundaries that lie in the same place; nothing is fixed, sheets are to agree later."""
     V, F = zoo.three_half_discs()
     mesh, found, _ = build_dirty(V, F)
     assert found.non_manifold_edges == 2 and found.inconsistent_edges == 0
     on_line = np.abs(mesh.X[:, 1:3]).max(axis=1) == 0
     assert on_line.sum() == 9  # three vertices, each once a sheet
-    assert (mesh.kind[on_line] == FIXED).all() and (mesh.kind[~on_line] == BOUNDARY).all()
+    assert (mesh.kind == CURVE).all()
     assert len(zoo.boundary_loops(faces_of(mesh))) == 3
+    ends = mesh.origin, mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    h = np.flatnonzero(on_line[ends[0]] & on_line[ends[1]])
+    assert len(h) == 6 and (mesh.twin[h] == NONE).all() and np.array_equal(mesh.curve[h], h)
 
 
-def test_equally_directed_faces_are_cut_and_fixed():
+def test_equally_directed_faces_are_cut():
     V, F = zoo.square()
     mesh, found, _ = build_dirty(V, [F[0], F[1][::-1]])
     assert found.inconsistent_edges == 1 and found.non_manifold_edges == 0
     assert len(mesh.X) == 6 and (mesh.twin == NONE).all()
-    assert sorted(mesh.kind.tolist()) == [BOUNDARY] * 2 + [FIXED] * 4
+    assert (mesh.kind == CURVE).all()
 
 
 def test_inconsistent_then_third_face_counts_once():
@@ -129,6 +143,8 @@ def test_many_faces_on_one_edge_do_not_hang():
     assert found.non_manifold_edges == 1
     assert len(mesh.X) == 3 * n and (mesh.twin == NONE).all()
     assert_valid(mesh)
+    _, copies = np.unique(mesh.X[:, :3], axis=0, return_counts=True)
+    assert sorted(copies.tolist()) == [1] * n + [n, n]
 
 
 def test_pinched_vertices_become_one_a_fan():

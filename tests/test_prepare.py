@@ -1,18 +1,22 @@
-"""From the caller's arrays to a clean mesh: dirt found and named, the frame, the length."""
+"""From the caller's arrays to a clean mesh: dirt found and named, windings, the frame."""
 
+import nonmanifold
 import numpy as np
 import pytest
 import zoo
 from structure import assert_valid, faces_of, shape_of
 
-from remeshvec import MeshInputError, OptionError
-from remeshvec._types import FIXED, NONE
+from remeshvec import MeshInputError
 from remeshvec.clean import drop_degenerate_faces, drop_duplicate_faces, weld_vertices
-from remeshvec.prepare import build_reference, choose_length, prepare
+from remeshvec.lengths import measure
+from remeshvec.prepare import prepare
 
 
 def prepared(V, F):
-    return prepare(np.asarray(V, float), np.asarray(F, np.int64), False)
+    result = prepare(np.asarray(V, float), np.asarray(F, np.int64), False)
+    assert not result.mesh.X[:, 3].any()
+    result.mesh.X[:, 3] = 1.0  # target lengths come later
+    return result
 
 
 def in_input_frame(result):
@@ -26,17 +30,28 @@ def test_tidy_meshes_pass_unchanged(name):
     assert result.dirt == {}
     assert_valid(result.mesh)
     assert shape_of(faces_of(result.mesh)) == shape_of(F)
-    # Face by face and corner by corner, bit by bit.
-    assert np.array_equal(in_input_frame(result)[faces_of(result.mesh)], V[F[result.face_source]])
+    assert_in_place(result, V, F)
+    assert result.same is None and result.flipped is None
+
+
+def assert_in_place(result, V, F):
+    """Face by face and corner by corner, bit by bit; flipped faces have corners 1 and 2 swapped."""
+    if result.flipped is not None:
+        assert result.flipped.shape == (len(F),) and result.flipped.any()
+        F = np.where(result.flipped[:, None], F[:, [0, 2, 1]], F)
+    F = F[result.face_source]
+    assert np.array_equal(in_input_frame(result)[faces_of(result.mesh)], V[F])
+    same = np.arange(len(V)) if result.same is None else result.same
+    assert np.array_equal(result.vertex_source[faces_of(result.mesh)], same[F])
 
 
 DIRT = {
-    "moebius": {"inconsistent_edges", "pinched_vertices"},
-    "inconsistent_winding": {"inconsistent_edges", "pinched_vertices"},
+    "moebius": {"flipped_faces", "inconsistent_edges"},
+    "inconsistent_winding": {"flipped_faces"},
     "bowtie": {"pinched_vertices"},
     "pinched_tetrahedra": {"pinched_vertices"},
-    "three_half_discs": {"non_manifold_edges", "pinched_vertices"},
-    "two_cubes_on_an_edge": {"non_manifold_edges", "pinched_vertices"},
+    "three_half_discs": {"non_manifold_edges"},
+    "two_cubes_on_an_edge": {"non_manifold_edges"},
     "duplicate_face": {"duplicate_faces"},
     "repeated_index": {"degenerate_faces"},
     "unreferenced_vertices": {"unreferenced_vertices"},
@@ -52,8 +67,8 @@ def test_dirt_is_found_and_named(name):
     assert set(result.dirt) == DIRT[name]
     assert all(type(count) is int and count > 0 for count in result.dirt.values())
     assert_valid(result.mesh, slits=True)
-    corners = in_input_frame(result)[faces_of(result.mesh)]
-    assert np.array_equal(corners, V[F[result.face_source]])
+    assert_in_place(result, V, F)
+    assert (result.flipped is not None) == ("flipped_faces" in result.dirt)
 
 
 def test_counts_of_dirt():
@@ -66,11 +81,20 @@ def test_counts_of_dirt():
     assert prepared(*zoo.three_half_discs()).dirt["non_manifold_edges"] == 2
 
 
+def test_seams_are_not_counted_as_pinched_but_other_vertices_are():
+    V, F = zoo.joined(zoo.three_half_discs(), zoo.bowtie(), shift=5.0)
+    assert prepared(V, F).dirt == {"non_manifold_edges": 2, "pinched_vertices": 1}
+    V, F = zoo.joined(zoo.moebius(), zoo.pinched_tetrahedra(), shift=5.0)
+    assert prepared(V, F).dirt["pinched_vertices"] == 1
+    V, F = nonmanifold.COMPLEXES["three_planes"].make()
+    assert set(prepared(V, F).dirt) == {"non_manifold_edges"}
+
+
 @pytest.mark.parametrize("name", ["flat_cap", "coincident_vertices"])
 def test_faces_without_area_are_counted(name):
     V, F = zoo.ZOO[name].make()
     result = prepared(V, F)
-    choose_length(result, None, 10**6)
+    measure(result)
     flat = sum(np.linalg.norm(np.cross(V[b] - V[a], V[c] - V[a])) == 0 for a, b, c in F)
     assert result.dirt == {"zero_area_faces": flat}
 
@@ -126,6 +150,76 @@ def test_cleaning_by_hand():
     assert weld_vertices(V, np.array([0, 1])) is None
 
 
+# --- windings ------------------------------------------------------------------------------------
+
+
+def some_turned(F, share, seed=0):
+    """Faces, a share of them with corners 1 and 2 swapped, and which."""
+    which = np.random.default_rng(seed).random(len(F)) < share
+    return np.where(which[:, None], F[:, [0, 2, 1]], F), which
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3])
+@pytest.mark.parametrize("name", ["icosphere", "genus_2", "annulus", "planar_delaunay"])
+def test_faces_take_the_winding_of_their_neighbours(name, share):
+    V, F = zoo.ZOO[name].make()
+    G, which = some_turned(F, share)
+    result = prepared(V, G)
+    assert result.dirt == {"flipped_faces": which.sum()}
+    assert np.array_equal(result.flipped, which)
+    assert_in_place(result, V, G)
+    assert shape_of(faces_of(result.mesh)) == shape_of(F)
+    assert_valid(result.mesh)
+
+
+def test_the_majority_keeps_its_winding_even_where_volumes_are_negative():
+    V, F = zoo.icosphere(1)
+    G, which = some_turned(F[:, ::-1], 0.2)
+    result = prepared(V, G)
+    assert np.array_equal(result.flipped, which)
+    assert zoo.volume(result.mesh.X[:, :3], faces_of(result.mesh)) < 0
+
+
+def test_windings_count_faces_of_the_input():
+    """Also behind faces that are dropped first."""
+    V, F = zoo.torus()
+    F = np.vstack([[[0, 0, 1], [3, 3, 3]], F[:5], F[:2], F[5:]])
+    turned = [10, 11, 40]
+    F[turned] = F[turned][:, [0, 2, 1]]
+    result = prepared(V, F)
+    assert result.dirt == {"degenerate_faces": 2, "duplicate_faces": 2, "flipped_faces": 3}
+    assert np.flatnonzero(result.flipped).tolist() == turned
+    assert_in_place(result, V, F)
+
+
+def test_a_moebius_strip_is_cut_where_its_windings_meet():
+    V, F = zoo.moebius()
+    G, _ = some_turned(F, 0.4)
+    ways = [prepared(V, faces) for faces in (F, G)]
+    # One line across the strip of four vertices, or all around it; the same whatever was turned.
+    cuts = [result.dirt["inconsistent_edges"] for result in ways]
+    assert cuts[0] == cuts[1] and cuts[0] in (3, 20)
+    for result, faces in zip(ways, (F, G), strict=True):
+        assert_valid(result.mesh, slits=True)
+        assert_in_place(result, V, faces)
+        assert zoo.is_oriented(faces_of(result.mesh))
+
+
+@pytest.mark.parametrize("name", ["book", "wall_inside", "three_planes", "double_bubble"])
+def test_sheets_are_oriented_each_by_itself(name):
+    """Edges of three faces and more join no windings: every sheet keeps that of its majority."""
+    V, F = nonmanifold.COMPLEXES[name].make()
+    tidy = prepared(V, F)
+    assert tidy.flipped is None
+    G, which = some_turned(F, 0.1)
+    result = prepared(V, G)
+    assert result.dirt["flipped_faces"] == which.sum() and np.array_equal(result.flipped, which)
+    assert result.dirt["non_manifold_edges"] == tidy.dirt["non_manifold_edges"]
+    assert "inconsistent_edges" not in result.dirt
+    assert_in_place(result, V, G)
+    assert zoo.components(faces_of(result.mesh)) == len(nonmanifold.COMPLEXES[name].euler_numbers)
+
+
 # --- frame ---------------------------------------------------------------------------------------
 
 
@@ -163,59 +257,4 @@ def test_no_surface():
     with pytest.raises(MeshInputError, match="one place"):
         prepared(np.ones((3, 3)), [[0, 1, 2]])
     with pytest.raises(MeshInputError, match="no area"):
-        choose_length(prepared([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]), None, 100)
-
-
-# --- length --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["torus", "grid", "cylinder"])
-def test_default_length_is_nine_tenths_of_the_mean_edge(name):
-    import igl
-
-    V, F = zoo.ZOO[name].make()
-    result = prepared(1000 * V, F)
-    edges = igl.edges(F)
-    mean = np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1).mean()
-    assert choose_length(result, None, 10**6) / result.scale == pytest.approx(900 * mean)
-    assert choose_length(result, 3.0, 10**8) / result.scale == pytest.approx(3.0)
-
-
-def test_too_many_faces_are_refused_with_the_numbers():
-    result = prepared(*zoo.grid())  # area 24
-    with pytest.raises(
-        OptionError, match=r"L = 0.001 .* 5.54e\+07 faces.*max_faces = 1,000.*mean edge"
-    ):
-        choose_length(result, 1e-3, 1000)
-    length = choose_length(result, 1.0, 56)  # 24 / (sqrt(3) / 4) = 55.4
-    assert length == result.scale
-    with pytest.raises(OptionError):
-        choose_length(result, 1.0, 55)
-
-
-def test_lengths_below_the_precision_are_refused():
-    result = prepared(zoo.grid()[0] + 1e13, zoo.grid()[1])
-    with pytest.raises(OptionError, match="precision"):
-        choose_length(result, 0.1, 10**9)
-
-
-# --- reference -----------------------------------------------------------------------------------
-
-
-def test_reference_is_a_copy_and_fixes_corners():
-    result = prepared(*zoo.grid())
-    reference = build_reference(result.mesh, 0.2, False)
-    fixed = result.mesh.kind == FIXED
-    corners = in_input_frame(result)[fixed, :2]
-    assert sorted(map(tuple, corners.tolist())) == [(0, 0), (0, 4), (6, 0), (6, 4)]
-    result.mesh.X[:] = 0
-    result.mesh.origin[:] = 0
-    assert reference.X.any() and reference.origin.any()
-
-
-def test_births_start_at_home():
-    result = prepared(*zoo.annulus())
-    mesh = result.mesh
-    assert np.array_equal(mesh.origin[mesh.birth], np.arange(len(mesh.X)))
-    rim = mesh.twin[mesh.vertex_halfedge] == NONE
-    assert (mesh.twin[mesh.birth[rim]] == NONE).all()
+        measure(prepared([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]))

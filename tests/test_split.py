@@ -6,7 +6,7 @@ import pytest
 import zoo
 from structure import assert_same_bits, assert_valid, blocks_of, built, copied, faces_of, shape_of
 
-from remeshvec._types import BOUNDARY, FIXED, INNER
+from remeshvec._types import CURVE, FIXED, INNER
 from remeshvec.edge_sets import make_blocks
 from remeshvec.operations import split as module
 from remeshvec.operations.split import MAX_ROUNDS, split_long_edges
@@ -141,7 +141,7 @@ def test_midpoints_get_kinds_and_births():
     corner = (refined.X[:, :2] % 1 == 0).all(axis=1)
     assert (refined.kind[corner] == FIXED).all() and corner.sum() == 4
     assert (refined.kind[inner] == INNER).all() and inner.sum() == 1
-    assert (refined.kind[~inner & ~corner] == BOUNDARY).all()
+    assert (refined.kind[~inner & ~corner] == CURVE).all()
     # A boundary midpoint is born where the boundary half-edge under it starts.
     h = refined.birth[~inner & ~corner]
     a, b = (mesh.X[mesh.origin[g], :3] for g in (h, np.where(h % 3 == 2, h - 2, h + 1)))

@@ -5,12 +5,11 @@ import naive
 import numpy as np
 import pytest
 import zoo
-from structure import assert_valid, built, faces_of, one_block
+from structure import assert_valid, built, faces_of, one_block, referenced
 
 from remeshvec._types import FIXED, INNER
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.untangle import untangle_vertices
-from remeshvec.prepare import build_reference
 
 MESHES = ["icosphere", "torus", "planar_delaunay", "annulus", "genus_2"]
 
@@ -19,7 +18,7 @@ def rough(name, noise=0.3):
     """Mesh with bad angles whose vertices lie on its reference."""
     V, F = zoo.upsampled(*zoo.ZOO[name].make(), noise=0.0)
     mesh = built(V, F, ordered=True)
-    reference = build_reference(mesh, zoo.mean_edge(V, F), False)
+    reference = referenced(mesh, zoo.mean_edge(V, F))
     W, _ = zoo.upsampled(mesh.X[:, :3].copy(), faces_of(mesh).astype(np.int64), n=0, noise=noise)
     mesh.X[:, :3] = W
     return mesh, reference
@@ -106,7 +105,7 @@ def test_nothing_to_do():
 def coarse_on_fine():
     """Icosphere of 320 faces whose reference is one of 20,480."""
     fine = built(*zoo.icosphere(5), ordered=True)
-    reference = build_reference(fine, 0.1, False)
+    reference = referenced(fine, 0.1)
     mesh = built(*zoo.icosphere(2), ordered=True)
     return mesh, reference
 

@@ -2,7 +2,10 @@
 
 Candidates are the edges below the limit, in the order of the arrays (sorting them by length gains
 nothing). A collapse removes one end and moves the other to the midpoint or to the quadric point; it
-owns the closed one-rings of both ends. Guards: boundary, link condition, overshoot, foldover, sliver.
+owns the closed one-rings of both ends. Guards: curves, link condition, overshoot, foldover, sliver.
+
+Siblings, the edges that lie in the same place on several sheets of a surface, collapse together or not
+at all: in a pass of their own, on one thread, since they are few.
 """
 
 from __future__ import annotations
@@ -13,20 +16,20 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from .._jit import driver, inlined
-from .._types import DEAD, INNER, NONE, Blocks, Mesh
+from .._jit import driver, inlined, kernel
+from .._types import CURVE, DEAD, FROZEN, INNER, NONE, SEAM, Blocks, IndexArray, Mesh
 from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
 from ..geometry import SHARP, distance_squared, face_vector
 from ..halfedge import following, previous
-from .guards import folds_over, keeps_boundary, keeps_link, makes_sliver, overshoots
+from .guards import folds_over, keeps_curves, keeps_link, makes_sliver, overshoots
 
-__all__ = ["CollapseLimits", "collapse_short_edges"]
+__all__ = ["CollapseLimits", "collapse_short_edges", "collapse_siblings"]
 
 # Outcomes of one candidate, and columns of the tally.
 COLLAPSED = 0
 OUTSIDE = 1
 GONE = 2
-KEPT_BOUNDARY = 3
+KEPT_CURVE = 3
 KEPT_LINK = 4
 KEPT_OVERSHOOT = 5
 KEPT_FOLDOVER = 6
@@ -41,8 +44,13 @@ RING_CAPACITY = 128
 _REGULARISER = 0.03
 
 
+# Along a curve the sheets on all sides must agree. Their own edges may become longer by this factor,
+# and are split by the next sweep: otherwise one long edge somewhere keeps a curve of short ones.
+_CURVE_SLACK = 1.5
+
+
 class CollapseLimits(NamedTuple):
-    """What a collapse may do; lengths in the mesh's units."""
+    """What a collapse may do; lengths as factors of the target length, the mean of an edge's ends."""
 
     shortest: float  # edges below are candidates
     longest: float  # no edge may become longer
@@ -54,10 +62,10 @@ class CollapseLimits(NamedTuple):
 def collapse_short_edges(
     mesh: Mesh, blocks: Blocks, limits: CollapseLimits, parallel: bool
 ) -> np.ndarray:
-    """Collapse edges shorter than ``limits.shortest``; returns counts by outcome."""
+    """Collapse the short edges but for those with siblings; returns counts by outcome."""
     candidates = np.empty(mesh.origin.size, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _find_short_edges(parallel, mesh, blocks, limits.shortest * limits.shortest, candidates, count)
+    _find_short_edges(parallel, mesh, blocks, 0.5 * limits.shortest, candidates, count)
     tally = np.zeros((len(count), N_OUTCOMES), np.int64)
     if count.any():
         for stage in stages(blocks):
@@ -67,7 +75,7 @@ def collapse_short_edges(
 
 
 @driver
-def _find_short_edges(mesh, blocks, shortest_squared, candidates, count):
+def _find_short_edges(mesh, blocks, half_factor, candidates, count):
     for k in prange(blocks.face.size - 1):
         end = 3 * blocks.face[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
@@ -79,14 +87,17 @@ def _find_short_edges(mesh, blocks, shortest_squared, candidates, count):
             l0 = distance_squared(mesh.X, a, b)
             l1 = distance_squared(mesh.X, b, c)
             l2 = distance_squared(mesh.X, c, a)
+            m0 = half_factor * (mesh.X[a, 3] + mesh.X[b, 3])
+            m1 = half_factor * (mesh.X[b, 3] + mesh.X[c, 3])
+            m2 = half_factor * (mesh.X[c, 3] + mesh.X[a, 3])
             # Stores without branches: whether an edge is short cannot be predicted.
             h = 3 * f
             candidates[end] = h
-            end += (l0 < shortest_squared) & (mesh.twin[h] < h)
+            end += (l0 < m0 * m0) & (mesh.twin[h] < h)
             candidates[min(end, h + 1)] = h + 1
-            end += (l1 < shortest_squared) & (mesh.twin[h + 1] < h + 1)
+            end += (l1 < m1 * m1) & (mesh.twin[h + 1] < h + 1)
             candidates[min(end, h + 2)] = h + 2
-            end += (l2 < shortest_squared) & (mesh.twin[h + 2] < h + 2)
+            end += (l2 < m2 * m2) & (mesh.twin[h + 2] < h + 2)
         count[k] = end - 3 * blocks.face[k]
 
 
@@ -115,41 +126,56 @@ def _collapse(mesh, blocks, stage, limits, candidates, count, tally):
 @inlined
 def _collapse_edge(mesh, h, low, high, limits, faces, ring, normals):
     """Collapse one edge if every guard agrees; returns the outcome."""
+    c = mesh.curve[h]
+    if c >= SEAM:
+        return KEPT_CURVE
+    outcome, x, y, z, s, n_a, n_b = _examine(mesh, h, low, high, limits, faces, ring, normals)
+    if outcome == COLLAPSED:
+        _remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b)
+    return outcome
+
+
+@inlined
+def _examine(mesh, h, low, high, limits, faces, ring, normals):
+    """Ask every guard; returns the outcome, the new position and length, and the faces of both rings."""
     a = np.int64(mesh.origin[h])
     b = np.int64(mesh.origin[following(h)])
     if b < low or b >= high:
-        return OUTSIDE
-    if not distance_squared(mesh.X, a, b) < limits.shortest * limits.shortest:
-        return GONE
-    if not keeps_boundary(mesh, h, a, b):
-        return KEPT_BOUNDARY
+        return OUTSIDE, 0.0, 0.0, 0.0, 0.0, 0, 0
+    shortest = 0.5 * limits.shortest * (mesh.X[a, 3] + mesh.X[b, 3])
+    if not distance_squared(mesh.X, a, b) < shortest * shortest:
+        return GONE, 0.0, 0.0, 0.0, 0.0, 0, 0
+    if not keeps_curves(mesh, h, a, b):
+        return KEPT_CURVE, 0.0, 0.0, 0.0, 0.0, 0, 0
     n_a, m_a = walk_ring(mesh, a, low, high, faces[0], ring[0])
     n_b, m_b = walk_ring(mesh, b, low, high, faces[1], ring[1])
     if n_a == 0 or n_b == 0:
-        return OUTSIDE
+        return OUTSIDE, 0.0, 0.0, 0.0, 0.0, 0, 0
     if n_a < 0 or n_b < 0:
-        return KEPT_LINK
+        return KEPT_LINK, 0.0, 0.0, 0.0, 0.0, 0, 0
     if not keeps_link(mesh, h, ring[0], n_a, m_a, ring[1], n_b, m_b):
-        return KEPT_LINK
+        return KEPT_LINK, 0.0, 0.0, 0.0, 0.0, 0, 0
     sharp_a = _measure_normals(mesh, faces[0], n_a, normals[0])
     sharp_b = _measure_normals(mesh, faces[1], n_b, normals[1])
-    x, y, z = _position(
+    x, y, z, s = _position(
         mesh, a, b, sharp_a, sharp_b, limits.quadric_reach, faces, n_a, n_b, normals
     )
-    limit = limits.longest * limits.longest
-    if overshoots(mesh.X, x, y, z, b, ring[0], m_a, limit) or overshoots(
-        mesh.X, x, y, z, a, ring[1], m_b, limit
-    ):
-        return KEPT_OVERSHOOT
+    half = 0.5 * limits.longest
     cosine = limits.foldover_cosine
-    if folds_over(mesh, x, y, z, b, faces[0], n_a, normals[0], cosine) or folds_over(
-        mesh, x, y, z, a, faces[1], n_b, normals[1], cosine
+    kind = max(mesh.kind[a], mesh.kind[b])
+    outcome = COLLAPSED
+    slack = _CURVE_SLACK if min(mesh.kind[a], mesh.kind[b]) == CURVE else 1.0
+    if overshoots(mesh, x, y, z, s, b, ring[0], m_a, half, slack) or overshoots(
+        mesh, x, y, z, s, a, ring[1], m_b, half, slack
     ):
-        return KEPT_FOLDOVER
-    if limits.sliver_check and makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
-        return KEPT_SLIVER
-    _remove_edge(mesh, h, a, b, x, y, z, faces, n_a, n_b)
-    return COLLAPSED
+        outcome = KEPT_OVERSHOOT
+    elif folds_over(mesh, x, y, z, kind, b, faces[0], n_a, normals[0], cosine) or folds_over(
+        mesh, x, y, z, kind, a, faces[1], n_b, normals[1], cosine
+    ):
+        outcome = KEPT_FOLDOVER
+    elif limits.sliver_check and makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
+        outcome = KEPT_SLIVER
+    return outcome, x, y, z, s, n_a, n_b
 
 
 @inlined
@@ -208,18 +234,23 @@ def _measure_normals(mesh, faces, n, normals):
 
 @inlined
 def _position(mesh, a, b, sharp_a, sharp_b, reach, faces, n_a, n_b, normals):
-    """Where the two ends meet: at the more constrained or sharper one, else midpoint or quadric."""
+    """Where the two ends meet: at the more constrained or sharper one, else midpoint or quadric.
+
+    The target length there comes last.
+    """
+    X = mesh.X
     is_inner = mesh.kind[a] == INNER and mesh.kind[b] == INNER
     if mesh.kind[a] > mesh.kind[b] or (is_inner and sharp_a and not sharp_b):
-        return mesh.X[a, 0], mesh.X[a, 1], mesh.X[a, 2]
+        return X[a, 0], X[a, 1], X[a, 2], X[a, 3]
     if mesh.kind[b] > mesh.kind[a] or (is_inner and sharp_b and not sharp_a):
-        return mesh.X[b, 0], mesh.X[b, 1], mesh.X[b, 2]
-    x = 0.5 * (mesh.X[a, 0] + mesh.X[b, 0])
-    y = 0.5 * (mesh.X[a, 1] + mesh.X[b, 1])
-    z = 0.5 * (mesh.X[a, 2] + mesh.X[b, 2])
-    if reach <= 0.0 or not is_inner:
-        return x, y, z
-    return _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b, normals)
+        return X[b, 0], X[b, 1], X[b, 2], X[b, 3]
+    x = 0.5 * (X[a, 0] + X[b, 0])
+    y = 0.5 * (X[a, 1] + X[b, 1])
+    z = 0.5 * (X[a, 2] + X[b, 2])
+    s = 0.5 * (X[a, 3] + X[b, 3])
+    if reach > 0.0 and is_inner:
+        x, y, z = _quadric_point(mesh, x, y, z, reach * s, faces, n_a, n_b, normals)
+    return x, y, z, s
 
 
 @inlined
@@ -270,9 +301,11 @@ def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b, normals):
 
 
 @inlined
-def _remove_edge(mesh, h, a, b, x, y, z, faces, n_a, n_b):
+def _remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b):
     """Close the edge's one or two faces and give the other faces of the removed end to the survivor."""
     twin = mesh.twin
+    a = np.int64(mesh.origin[h])
+    b = np.int64(mesh.origin[following(h)])
     t = np.int64(twin[h])
     n = following(h)
     tn = np.int64(twin[n])
@@ -303,17 +336,25 @@ def _remove_edge(mesh, h, a, b, x, y, z, faces, n_a, n_b):
     mesh.X[survivor, 0] = x
     mesh.X[survivor, 1] = y
     mesh.X[survivor, 2] = z
+    mesh.X[survivor, 3] = s
+    if mesh.kind[removed] == CURVE and mesh.kind[survivor] == CURVE:
+        mesh.birth[survivor] = min(mesh.birth[a], mesh.birth[b])  # the same for all siblings
 
 
 @inlined
 def _close_face(mesh, h, tn, tp):
-    """Remove the face of ``h`` and join the twins of its other two edges."""
+    """Remove the face of ``h`` and join the twins of its other two edges; at most one is on a curve."""
     p = previous(h)
     apex = mesh.origin[p]
+    curve = max(mesh.curve[following(h)], mesh.curve[p])
+    if mesh.curve[following(h)] == FROZEN or mesh.curve[p] == FROZEN:
+        curve = np.int32(FROZEN)
     if tn != NONE:
         mesh.twin[tn] = tp
+        mesh.curve[tn] = curve
     if tp != NONE:
         mesh.twin[tp] = tn
+        mesh.curve[tp] = curve
     if mesh.vertex_halfedge[apex] == p:
         mesh.vertex_halfedge[apex] = tn
     mesh.valence_excess[apex] -= 1
@@ -321,3 +362,62 @@ def _close_face(mesh, h, tn, tp):
     mesh.origin[3 * f] = DEAD
     mesh.origin[3 * f + 1] = DEAD
     mesh.origin[3 * f + 2] = DEAD
+
+
+def collapse_siblings(
+    mesh: Mesh, members: IndexArray, group: IndexArray, limits: CollapseLimits
+) -> int:
+    """Collapse short edges with siblings, all of a group or none; returns the number of groups.
+
+    Parameters
+    ----------
+    members : (k,) int32
+        Half-edges, those of a group together.
+    group : (g + 1,) int32
+        Where the groups start.
+    """
+    return int(_collapse_siblings(mesh, members, group, limits))
+
+
+@kernel
+def _collapse_siblings(mesh, members, group, limits):
+    faces = np.empty((2, RING_CAPACITY), np.int64)
+    ring = np.empty((2, RING_CAPACITY), np.int64)
+    normals = np.empty((2, RING_CAPACITY, 4))
+    touched = np.full(mesh.vertex_halfedge.size, NONE, np.int32)
+    end = np.int64(mesh.vertex_halfedge.size)
+    done = 0
+    for g in range(group.size - 1):
+        agreed = True
+        for i in range(group[g], group[g + 1]):
+            h = np.int64(members[i])
+            if mesh.origin[h] == DEAD:
+                agreed = False
+                break
+            outcome, _, _, _, _, n_a, n_b = _examine(mesh, h, 0, end, limits, faces, ring, normals)
+            # Where the rings of two siblings meet, on one sheet that meets itself, all stay.
+            if outcome != COLLAPSED or _claim(mesh, faces, n_a, n_b, touched, group[g], i):
+                agreed = False
+                break
+        if not agreed:
+            continue
+        done += 1
+        for i in range(group[g], group[g + 1]):
+            h = np.int64(members[i])
+            _, x, y, z, s, n_a, n_b = _examine(mesh, h, 0, end, limits, faces, ring, normals)
+            _remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b)
+    return done
+
+
+@inlined
+def _claim(mesh, faces, n_a, n_b, touched, first, mine):
+    """Mark all vertices around an edge; tells whether a sibling has marked one of them."""
+    met = False
+    for side in range(2):
+        for i in range(n_a if side == 0 else n_b):
+            h = faces[side, i]
+            for g in (h, following(h), previous(h)):
+                v = mesh.origin[g]
+                met |= touched[v] >= first and touched[v] < mine
+                touched[v] = mine
+    return met

@@ -13,7 +13,7 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver
-from .._types import DEAD, INNER, MAX_VALENCE, NONE, Blocks, Mesh, Tree
+from .._types import DEAD, HELD, INNER, MAX_VALENCE, NONE, Blocks, Mesh, Tree
 from ..bvh import STACK, closest_face, point_on_face
 from ..geometry import face_vector
 from ..halfedge import previous
@@ -24,7 +24,7 @@ _SHARE = 0.5
 
 
 def fit_vertices(mesh: Mesh, blocks: Blocks, tree: Tree, reach: float, parallel: bool) -> None:
-    """Move inner vertices once, by at most ``reach``."""
+    """Move inner vertices once, by at most ``reach`` times their target length."""
     gaps = np.zeros((mesh.origin.size // 3, 4))
     _measure_gaps(parallel, mesh, blocks, tree, gaps)
     _shift(parallel, mesh, blocks, gaps, reach, mesh.X)
@@ -48,7 +48,12 @@ def _measure_gaps(mesh, blocks, tree, gaps):
             x = (X[a, 0] + X[b, 0] + X[c, 0]) / 3.0
             y = (X[a, 1] + X[b, 1] + X[c, 1]) / 3.0
             z = (X[a, 2] + X[b, 2] + X[c, 2]) / 3.0
-            g, s, t, _ = closest_face(tree, x, y, z, np.int64(mesh.birth[a]) // 3, 0.0, stack)
+            # A face all of whose vertices lie on curves has none to start from.
+            hint = np.int64(mesh.source[f])
+            for v in (a, b, c):
+                if mesh.kind[v] <= HELD:
+                    hint = np.int64(mesh.birth[v]) // 3
+            g, s, t, _ = closest_face(tree, x, y, z, hint, 0.0, stack)
             qx, qy, qz = point_on_face(tree.corners, g, s, t)
             gap = (qx - x) * nx + (qy - y) * ny + (qz - z) * nz
             gaps[f, 0], gaps[f, 1], gaps[f, 2], gaps[f, 3] = nx, ny, nz, gap
@@ -75,7 +80,8 @@ def _shift(mesh, blocks, gaps, reach, X):
                     break
             norm = sqrt(nx * nx + ny * ny + nz * nz)
             if norm > 0.0:
-                step = max(-reach, min(reach, _SHARE * gap / weight)) / norm
+                limit = reach * X[v, 3]
+                step = max(-limit, min(limit, _SHARE * gap / weight)) / norm
                 X[v, 0] += step * nx
                 X[v, 1] += step * ny
                 X[v, 2] += step * nz

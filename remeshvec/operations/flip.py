@@ -14,9 +14,9 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined
-from .._types import DEAD, MAX_VALENCE, NONE, Blocks, Mesh
+from .._types import CURVE, DEAD, MAX_VALENCE, NONE, Blocks, Mesh
 from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
-from ..geometry import distance_squared, face_vector, mean_ratio, turn_exceeds
+from ..geometry import distance_squared, face_vector, is_flat, mean_ratio, turn_exceeds
 from ..halfedge import following, previous
 
 __all__ = ["FlipLimits", "flip_edges"]
@@ -60,7 +60,8 @@ def _find_flips(mesh, blocks, delaunay_ties, candidates, count):
             if t > h or t == NONE or mesh.origin[h] == DEAD:
                 continue
             gain = valence_gain(mesh, h, t)
-            if gain > 0 or (gain == 0 and delaunay_ties and violates_delaunay(mesh, h, t)):
+            wanted = gain > 0 or (gain == 0 and delaunay_ties and violates_delaunay(mesh, h, t))
+            if wanted and mesh.curve[h] == NONE:
                 candidates[end] = h
                 end += 1
         count[k] = end - 3 * blocks.face[k]
@@ -190,7 +191,13 @@ def bends_quad(mesh, h, t, cosine):
         X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2], X[d, 0], X[d, 1], X[d, 2]
     )
     mx, my, mz = ux + wx, uy + wy, uz + wz
-    mx, my, mz = ux + wx, uy + wy, uz + wz
+    # Three vertices of a straight curve: the normal is rounding.
+    if mesh.kind[c] >= CURVE and mesh.kind[d] >= CURVE:
+        new = distance_squared(X, c, d)
+        if mesh.kind[a] >= CURVE and is_flat(ux, uy, uz, new):
+            return True
+        if mesh.kind[b] >= CURVE and is_flat(wx, wy, wz, new):
+            return True
     return turn_exceeds(ux, uy, uz, mx, my, mz, cosine) or turn_exceeds(
         wx, wy, wz, mx, my, mz, cosine
     )
@@ -246,6 +253,10 @@ def _turn_edge(mesh, h, t):
     origin[tn] = c
     twin[hn] = tn
     twin[tn] = hn
+    curve = mesh.curve
+    curve[h], curve[t] = curve[tn], curve[hn]
+    curve[hn] = NONE
+    curve[tn] = NONE
     # Edge a-d moved from slot tn to h, b-c from hn to t.
     if mesh.vertex_halfedge[a] == tn:
         mesh.vertex_halfedge[a] = h

@@ -8,28 +8,40 @@ from __future__ import annotations
 
 from math import sqrt
 
+import numpy as np
+
 from .._jit import inlined
-from .._types import APEX, FIXED, NONE
-from ..geometry import distance_squared, face_vector, mean_ratio, turn_exceeds
+from .._types import CURVE, INNER, NONE
+from ..geometry import distance_squared, face_vector, is_flat, mean_ratio, turn_exceeds
 from ..halfedge import following, previous
 
-__all__ = ["folds_over", "keeps_boundary", "keeps_link", "makes_sliver", "overshoots"]
+__all__ = ["folds_over", "joins_curves", "keeps_curves", "keeps_link", "makes_sliver", "overshoots"]
 
 
 @inlined
-def keeps_boundary(mesh, h, a, b):
-    """Guard: fixed vertices and tips stay, and no inner edge joins two parts of the boundary.
+def keeps_curves(mesh, h, a, b):
+    """Guard: fixed and held vertices stay, and a vertex of a curve leaves along this curve only.
 
-    A boundary edge may go unless its face hangs on it alone.
+    Of the face beside a vanishing edge at most one other edge may be on a curve, since the two become
+    one; a boundary edge stays where its face hangs on it alone.
     """
     kind = min(mesh.kind[a], mesh.kind[b])
-    if kind == FIXED or kind == APEX:
+    if kind == INNER:
+        return True
+    if kind != CURVE or mesh.curve[h] < 0:
         return False
-    on_a = mesh.twin[mesh.vertex_halfedge[a]] == NONE
-    on_b = mesh.twin[mesh.vertex_halfedge[b]] == NONE
-    if mesh.twin[h] != NONE:
-        return not (on_a and on_b)
-    return mesh.twin[following(h)] != NONE or mesh.twin[previous(h)] != NONE
+    t = np.int64(mesh.twin[h])
+    if joins_curves(mesh, h) or (t != NONE and joins_curves(mesh, t)):
+        return False
+    return t != NONE or (
+        mesh.twin[following(h)] != NONE or mesh.twin[previous(h)] != NONE
+    )
+
+
+@inlined
+def joins_curves(mesh, h):
+    """Tell whether both other edges of a face are on curves."""
+    return mesh.curve[following(h)] != NONE and mesh.curve[previous(h)] != NONE
 
 
 @inlined
@@ -50,22 +62,32 @@ def keeps_link(mesh, h, ring_a, n_a, m_a, ring_b, n_b, m_b):
 
 
 @inlined
-def overshoots(X, x, y, z, other, ring, m, limit):
-    """Guard: an edge from the new position to the ring would be too long."""
-    longest = 0.0
+def overshoots(mesh, x, y, z, s, other, ring, m, half_factor, slack):
+    """Guard: an edge from the new position to the ring would be too long for the length ``s`` there.
+
+    Edges to inner vertices may be longer by ``slack``.
+    """
+    X = mesh.X
     for i in range(m):
         w = ring[i]
-        if w != other:
-            dx = X[w, 0] - x
-            dy = X[w, 1] - y
-            dz = X[w, 2] - z
-            longest = max(longest, dx * dx + dy * dy + dz * dz)
-    return longest > limit
+        dx = X[w, 0] - x
+        dy = X[w, 1] - y
+        dz = X[w, 2] - z
+        limit = half_factor * (s + X[w, 3])
+        if slack != 1.0 and mesh.kind[w] == INNER:
+            limit *= slack
+        if w != other and dx * dx + dy * dy + dz * dz > limit * limit:
+            return True
+    return False
 
 
 @inlined
-def folds_over(mesh, x, y, z, other, faces, n, normals, cosine):
-    """Guard: a face that stays would turn its normal too far, or lose its area."""
+def folds_over(mesh, x, y, z, kind, other, faces, n, normals, cosine):
+    """Guard: a face that stays would turn its normal too far, or lose its area.
+
+    ``kind`` is that of the vertex that stays. On a curve, faces whose corners all lie on curves may
+    become flat along a straight one, with a normal that is rounding.
+    """
     X = mesh.X
     for i in range(n):
         v = mesh.origin[following(faces[i])]
@@ -78,6 +100,14 @@ def folds_over(mesh, x, y, z, other, faces, n, normals, cosine):
                 return True
         elif turn_exceeds(normals[i, 0], normals[i, 1], normals[i, 2], nx, ny, nz, cosine):
             return True
+        if kind >= CURVE and mesh.kind[v] >= CURVE and mesh.kind[w] >= CURVE:
+            longest = max(
+                distance_squared(X, v, w),
+                (X[v, 0] - x) ** 2 + (X[v, 1] - y) ** 2 + (X[v, 2] - z) ** 2,
+                (X[w, 0] - x) ** 2 + (X[w, 1] - y) ** 2 + (X[w, 2] - z) ** 2,
+            )
+            if is_flat(nx, ny, nz, longest):
+                return True
     return False
 
 

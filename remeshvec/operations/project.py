@@ -1,8 +1,8 @@
 """Project vertices onto the reference surface, and say where on it they lie.
 
-Inner vertices go to the closest point of the surface, found from the face of the last time; boundary
-vertices to the closest point of their own stretch of the boundary, so that a border does not shrink
-and its vertices do not leave it; fixed vertices stay.
+Inner vertices go to the closest point of their patch of the surface, found from the face of the last
+time; vertices on curves to the closest point of their own stretch of the curve, so that a border does
+not shrink and a crease stays sharp; fixed vertices stay.
 """
 
 from __future__ import annotations
@@ -12,40 +12,61 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from .._jit import driver
-from .._types import BOUNDARY, DEAD, INNER, NONE, Blocks, FloatArray, IndexArray, Mesh, Tree
-from ..boundary import closest_on_boundary
-from ..bvh import STACK, closest_face, point_on_face
-from ..halfedge import following
+from .._jit import driver, inlined
+from .._types import (
+    CURVE,
+    DEAD,
+    INNER,
+    MAX_VALENCE,
+    NONE,
+    Blocks,
+    FloatArray,
+    IndexArray,
+    Mesh,
+    Tree,
+)
+from ..bvh import STACK, closest_face, point_on_face, search_face, walk_to_face
+from ..geometry import face_vector
+from ..halfedge import following, previous
+from ..polyline import closest_on_curve
 
-__all__ = ["Reference", "locate_vertices", "project_boundary", "project_vertices"]
+__all__ = [
+    "Reference",
+    "locate_vertices",
+    "project_curves",
+    "project_vertices",
+    "read_lengths",
+]
 
 
 class Reference(NamedTuple):
     """The input surface: what vertices are projected onto and born on."""
 
     tree: Tree
-    X: FloatArray  # (n, 4)
+    X: FloatArray  # (n, 4), target lengths in the last column
     origin: IndexArray  # (3 m,)
-    links: IndexArray  # (2, 3 m), see `boundary.link_boundary`
+    beside: IndexArray  # (2, 3 m), see `polyline.join_edges`
 
 
 def project_vertices(
     mesh: Mesh, blocks: Blocks, reference: Reference, trust: float, parallel: bool
 ) -> None:
-    """Move inner and boundary vertices to the closest points of the reference surface.
+    """Move vertices inside patches and on curves to the closest points of the reference surface.
 
-    Inner vertices walk there from where they were the last time; the whole surface is searched for
-    those that end farther than ``trust`` from it.
+    Vertices walk there from where they were the last time. Of those that end farther than ``trust``
+    times their target length away, the whole patch is searched, but for faces that look the other way.
     """
-    _project_inner(parallel, mesh, blocks, reference.tree, trust * trust, mesh.X, mesh.birth)
-    project_boundary(mesh, blocks, reference, parallel)
+    before = mesh.X.copy()
+    _project_inner(
+        parallel, mesh, blocks, reference.tree, trust * trust, before, mesh.X, mesh.birth
+    )
+    project_curves(mesh, blocks, reference, parallel)
 
 
-def project_boundary(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
-    """Move boundary vertices only: they slide in every sweep, the others drift for some."""
-    if reference.links.shape[1]:
-        _project_boundary(parallel, mesh, blocks, *reference[1:], mesh.X, mesh.birth)
+def project_curves(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
+    """Move vertices on curves only: they slide in every sweep, the others drift for some."""
+    if reference.beside.shape[1]:
+        _project_curves(parallel, mesh, blocks, *reference[1:], mesh.X, mesh.birth)
 
 
 def locate_vertices(
@@ -53,7 +74,7 @@ def locate_vertices(
 ) -> FloatArray:
     """Find where every vertex lies without moving it; sets ``mesh.birth``.
 
-    ``trust`` as in `project_vertices`: inf for vertices that were just projected.
+    ``trust`` as in `project_vertices`, but a length: inf for vertices that were just projected.
 
     Returns
     -------
@@ -66,27 +87,59 @@ def locate_vertices(
     return barycentric
 
 
+def read_lengths(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
+    """Set the target length at every vertex to that of the reference where the vertex lies."""
+    weights = locate_vertices(mesh, blocks, reference, np.inf, parallel)
+    _read_lengths(
+        parallel, mesh, blocks, reference.X, reference.origin, mesh.birth, weights, mesh.X
+    )
+
+
 @driver
-def _project_inner(mesh, blocks, tree, trust, X, birth):
+def _project_inner(mesh, blocks, tree, trust, before, X, birth):
     for k in prange(blocks.vertex.size - 1):
         stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != INNER:
                 continue
-            hint = np.int64(birth[v]) // 3
-            f, s, t, _ = closest_face(tree, X[v, 0], X[v, 1], X[v, 2], hint, trust, stack)
+            x, y, z = before[v, 0], before[v, 1], before[v, 2]
+            f, s, t, d = walk_to_face(tree, x, y, z, np.int64(birth[v]) // 3)
+            if d > trust * before[v, 3] * before[v, 3]:
+                nx, ny, nz = _ring_normal(mesh, before, v)
+                f, s, t, d = search_face(tree, x, y, z, f, nx, ny, nz, stack)
             birth[v] = 3 * f
             X[v, 0], X[v, 1], X[v, 2] = point_on_face(tree.corners, f, s, t)
 
 
+@inlined
+def _ring_normal(mesh, X, v):
+    """Sum of the area vectors around a vertex."""
+    sx = sy = sz = 0.0
+    start = np.int64(mesh.vertex_halfedge[v])
+    h = start
+    for _ in range(MAX_VALENCE):
+        b = mesh.origin[following(h)]
+        c = mesh.origin[previous(h)]
+        nx, ny, nz = face_vector(
+            X[v, 0], X[v, 1], X[v, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
+        )
+        sx += nx
+        sy += ny
+        sz += nz
+        h = np.int64(mesh.twin[previous(h)])
+        if h == NONE or h == start:
+            break
+    return sx, sy, sz
+
+
 @driver
-def _project_boundary(mesh, blocks, X_in, origin, links, X, birth):
+def _project_curves(mesh, blocks, X_in, origin, beside, X, birth):
     for k in prange(blocks.vertex.size - 1):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
-            if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != BOUNDARY:
+            if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != CURVE:
                 continue
-            h, s, _ = closest_on_boundary(
-                X_in, origin, links, np.int64(birth[v]), X[v, 0], X[v, 1], X[v, 2]
+            h, s, _ = closest_on_curve(
+                X_in, origin, beside, np.int64(birth[v]), X[v, 0], X[v, 1], X[v, 2]
             )
             birth[v] = h
             a = origin[h]
@@ -96,7 +149,7 @@ def _project_boundary(mesh, blocks, X_in, origin, links, X, birth):
 
 
 @driver
-def _locate(mesh, blocks, tree, X_in, origin, links, trust, birth, barycentric):
+def _locate(mesh, blocks, tree, X_in, origin, beside, trust, birth, barycentric):
     for k in prange(blocks.vertex.size - 1):
         stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
@@ -104,15 +157,28 @@ def _locate(mesh, blocks, tree, X_in, origin, links, trust, birth, barycentric):
                 continue
             x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
             hint = np.int64(birth[v])
-            if mesh.twin[mesh.vertex_halfedge[v]] != NONE:
+            if mesh.kind[v] < CURVE:
                 f, s, t, _ = closest_face(tree, x, y, z, hint // 3, trust, stack)
                 birth[v] = 3 * f
                 barycentric[v, 0] = 1.0 - s - t
                 barycentric[v, 1] = s
                 barycentric[v, 2] = t
                 continue
-            h, s, _ = closest_on_boundary(X_in, origin, links, hint, x, y, z)
+            # A fixed vertex lies where its edge starts, and finds itself there.
+            h, s, _ = closest_on_curve(X_in, origin, beside, hint, x, y, z)
             birth[v] = h
             corner = h - 3 * (h // 3)
             barycentric[v, corner] = 1.0 - s
             barycentric[v, (corner + 1) % 3] = s
+
+
+@driver
+def _read_lengths(mesh, blocks, X_in, origin, birth, weights, X):
+    for k in prange(blocks.vertex.size - 1):
+        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
+            if mesh.vertex_halfedge[v] != DEAD:
+                f = np.int64(birth[v]) // 3
+                length = 0.0
+                for i in range(3):
+                    length += weights[v, i] * X_in[origin[3 * f + i], 3]
+                X[v, 3] = length

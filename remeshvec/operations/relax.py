@@ -1,7 +1,8 @@
 """Tangential relaxation: every vertex moves towards the area-weighted centroid of its one-ring.
 
 ``p += (I - n n^T) (g - p)`` with ``g = sum A_j p_j / sum A_j`` and A the mixed Voronoi area [Botsch and
-Kobbelt 2004, section 4]. All vertices move at once (Jacobi). Sums run over faces, not over rings: faces
+Kobbelt 2004, section 4], over the square of the target length where that varies [Dunyach et al. 2013,
+section 3]. Vertices on curves move along their curve. All vertices move at once (Jacobi). Sums run over faces, not over rings: faces
 are read in order without dependent loads, and every normal and area is made once instead of three
 times. A block adds up the faces inside its vertex range; the faces across borders come after, on one
 thread, so each vertex sums in the same order on any number of threads.
@@ -10,52 +11,49 @@ thread, so each vertex sums in the same order on any number of threads.
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
-
 import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined, kernel
-from .._types import BOUNDARY, DEAD, INNER, MAX_VALENCE, NONE, Blocks, Mesh
+from .._types import CURVE, DEAD, INNER, MAX_VALENCE, NONE, Blocks, Mesh
 from ..geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
 from ..halfedge import following, previous
 
-__all__ = ["RelaxOptions", "relax_vertices"]
+__all__ = ["relax_vertices"]
 
 # Columns of the sums: weights, weighted positions, normal, its weight, normal tensor (xx xy xz yy yz
 # zz), its weight; padded to two cache lines.
 N_SUMS = 16
 
 
-class RelaxOptions(NamedTuple):
-    """How vertices relax."""
+def relax_vertices(mesh: Mesh, blocks: Blocks, stiffness: float, parallel: bool) -> None:
+    """Move every inner vertex once in its tangent plane, those on curves along them.
 
-    stiffness: float  # hold of curved ridges on their vertices; 0: off
-    slide: bool  # boundary vertices move along the boundary
-
-
-def relax_vertices(mesh: Mesh, blocks: Blocks, options: RelaxOptions, parallel: bool) -> None:
-    """Move every inner vertex once in its tangent plane, boundary vertices along the boundary."""
+    ``stiffness`` is the hold of curved ridges on their vertices; 0 for none.
+    """
+    points = np.empty((mesh.vertex_halfedge.size, 4))  # where vertices were, and their weights
     sums = np.empty((mesh.vertex_halfedge.size, N_SUMS))
     across = np.empty(mesh.origin.size // 3, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _sum_areas(parallel, mesh, blocks, mesh.X, across, count)
-    _sum_areas_across(mesh, blocks, across, count)
-    _sum_rings(parallel, mesh, blocks, options, sums)
-    _sum_rings_across(mesh, blocks, options, across, count, sums)
-    if options.slide:
-        _aim_boundary(parallel, mesh, blocks, sums)
-    _move(parallel, mesh, blocks, options, sums, mesh.X)
+    _sum_areas(parallel, mesh, blocks, points, across, count)
+    _sum_areas_across(mesh, blocks, points, across, count)
+    _sum_rings(parallel, mesh, blocks, stiffness, points, sums)
+    _sum_rings_across(mesh, blocks, stiffness, points, across, count, sums)
+    _move(parallel, mesh, blocks, stiffness, points, sums, mesh.X)
 
 
 @driver
-def _sum_areas(mesh, blocks, X, across, count):
+def _sum_areas(mesh, blocks, points, across, count):
     """Mixed Voronoi areas from the faces inside a block; lists the faces across borders."""
+    X = mesh.X
     for k in prange(blocks.face.size - 1):
         low = blocks.vertex[k]
         high = blocks.vertex[k + 1]
         for v in range(low, high):
-            X[v, 3] = 0.0
+            points[v, 0] = X[v, 0]
+            points[v, 1] = X[v, 1]
+            points[v, 2] = X[v, 2]
+            points[v, 3] = 0.0
         end = blocks.face[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             a = mesh.origin[3 * f]
@@ -67,16 +65,16 @@ def _sum_areas(mesh, blocks, X, across, count):
                 across[end] = f
                 end += 1
                 continue
-            _add_areas(X, a, b, c)
+            _add_areas(points, a, b, c)
         count[k] = end - blocks.face[k]
 
 
 @kernel
-def _sum_areas_across(mesh, blocks, across, count):
+def _sum_areas_across(mesh, blocks, points, across, count):
     for k in range(blocks.face.size - 1):
         for i in range(blocks.face[k], blocks.face[k] + count[k]):
             f = across[i]
-            _add_areas(mesh.X, mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2])
+            _add_areas(points, mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2])
 
 
 @inlined
@@ -97,32 +95,38 @@ def _add_areas(X, a, b, c):
 
 
 @driver
-def _sum_rings(mesh, blocks, options, sums):
+def _sum_rings(mesh, blocks, stiffness, points, sums):
     for k in prange(blocks.face.size - 1):
         low = blocks.vertex[k]
         high = blocks.vertex[k + 1]
         sums[low:high] = 0.0
+        for v in range(low, high):
+            points[v, 3] /= mesh.X[v, 3] * mesh.X[v, 3]
+            # Half of the cell of a boundary vertex is missing: counted so, it would let its neighbours
+            # drift inwards until the edges between are split, and collapsed, for ever.
+            if mesh.kind[v] >= CURVE and mesh.twin[max(0, mesh.vertex_halfedge[v])] == NONE:
+                points[v, 3] *= 2.0
         for f in range(blocks.face[k], blocks.face[k + 1]):
             a = mesh.origin[3 * f]
             b = mesh.origin[3 * f + 1]
             c = mesh.origin[3 * f + 2]
             if min(a, b, c) >= low and max(a, b, c) < high:
-                _add_face(mesh.X, a, b, c, options, sums)
+                _add_face(points, a, b, c, stiffness, sums)
 
 
 @kernel
-def _sum_rings_across(mesh, blocks, options, across, count, sums):
+def _sum_rings_across(mesh, blocks, stiffness, points, across, count, sums):
     for k in range(blocks.face.size - 1):
         for i in range(blocks.face[k], blocks.face[k] + count[k]):
             f = across[i]
             a = mesh.origin[3 * f]
             b = mesh.origin[3 * f + 1]
             c = mesh.origin[3 * f + 2]
-            _add_face(mesh.X, a, b, c, options, sums)
+            _add_face(points, a, b, c, stiffness, sums)
 
 
 @inlined
-def _add_face(X, a, b, c, options, sums):
+def _add_face(X, a, b, c, stiffness, sums):
     """Add a face to the sums of its corners; its half-edges bring each the neighbour they end at."""
     nx, ny, nz = face_vector(
         X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
@@ -137,7 +141,7 @@ def _add_face(X, a, b, c, options, sums):
     _add_normal(sums, a, norm, ux, uy, uz)
     _add_normal(sums, b, norm, ux, uy, uz)
     _add_normal(sums, c, norm, ux, uy, uz)
-    if options.stiffness > 0.0:
+    if stiffness > 0.0:
         _add_tensor(sums, a, ux, uy, uz, nx, ny, nz, norm)
         _add_tensor(sums, b, ux, uy, uz, nx, ny, nz, norm)
         _add_tensor(sums, c, ux, uy, uz, nx, ny, nz, norm)
@@ -172,67 +176,75 @@ def _add_tensor(sums, v, ux, uy, uz, nx, ny, nz, norm):
 
 
 @driver
-def _aim_boundary(mesh, blocks, sums):
-    """Put the steps of boundary vertices, towards the middle of their two neighbours, in the sums."""
-    X = mesh.X
-    for k in prange(blocks.vertex.size - 1):
-        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
-            if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != BOUNDARY:
-                continue
-            h = np.int64(mesh.vertex_halfedge[v])
-            after = mesh.origin[following(h)]
-            for _ in range(MAX_VALENCE):
-                p = previous(h)
-                h = np.int64(mesh.twin[p])
-                if h == NONE:
-                    break
-            before = mesh.origin[p]
-            along = 0.0
-            length = 0.0
-            for i in range(3):
-                direction = X[after, i] - X[before, i]
-                length += direction * direction
-                along += direction * (0.5 * (X[after, i] + X[before, i]) - X[v, i])
-            share = along / length if length > 0.0 else 0.0
-            for i in range(3):
-                sums[v, 1 + i] = share * (X[after, i] - X[before, i])
-
-
-@driver
-def _move(mesh, blocks, options, sums, X):
+def _move(mesh, blocks, stiffness, points, sums, X):
     for k in prange(blocks.vertex.size - 1):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD:
                 continue
+            dx = dy = dz = 0.0
             if mesh.kind[v] == INNER:
-                _move_vertex(X, v, sums, options.stiffness)
-            elif options.slide and mesh.kind[v] == BOUNDARY:
-                for i in range(3):
-                    X[v, i] += sums[v, 1 + i]
+                dx, dy, dz = _step(points, v, sums, stiffness)
+            elif mesh.kind[v] == CURVE:
+                dx, dy, dz = _step_along_curve(mesh, points, v)
+            X[v, 0] = points[v, 0] + dx
+            X[v, 1] = points[v, 1] + dy
+            X[v, 2] = points[v, 2] + dz
 
 
 @inlined
-def _move_vertex(X, v, sums, stiffness):
+def _step_along_curve(mesh, P, v):
+    """Step along the chord of the two neighbours on the curve, to where both edges suit their lengths.
+
+    The same bits on every sheet that shares the curve, whichever neighbour comes first.
+    """
+    start = np.int64(mesh.vertex_halfedge[v])
+    h = start
+    u = w = np.int32(NONE)
+    for _ in range(MAX_VALENCE):
+        if mesh.curve[h] != NONE:
+            u, w = w, mesh.origin[following(h)]
+        p = previous(h)
+        h = np.int64(mesh.twin[p])
+        if h == NONE:
+            u, w = w, mesh.origin[p]
+            break
+        if h == start:
+            break
+    if u == NONE:
+        return 0.0, 0.0, 0.0
+    at_u = mesh.X[w, 3] + mesh.X[v, 3]
+    at_w = mesh.X[u, 3] + mesh.X[v, 3]
+    along = 0.0
+    length = 0.0
+    for i in range(3):
+        direction = P[w, i] - P[u, i]
+        aim = (P[u, i] * at_u + P[w, i] * at_w) / (at_u + at_w)
+        length += direction * direction
+        along += direction * (aim - P[v, i])
+    share = along / length if length > 0.0 else 0.0
+    return share * (P[w, 0] - P[u, 0]), share * (P[w, 1] - P[u, 1]), share * (P[w, 2] - P[u, 2])
+
+
+@inlined
+def _step(P, v, sums, stiffness):
     # A vertex on a sharp edge has no tangent plane: it stays, or the rim of a sheet would creep inwards.
     nx, ny, nz = sums[v, 4], sums[v, 5], sums[v, 6]
     norm = sqrt(nx * nx + ny * ny + nz * nz)
     if not (sums[v, 0] > 0.0 and norm > SHARP * sums[v, 7]):
-        return
+        return 0.0, 0.0, 0.0
     nx /= norm
     ny /= norm
     nz /= norm
-    dx = sums[v, 1] / sums[v, 0] - X[v, 0]
-    dy = sums[v, 2] / sums[v, 0] - X[v, 1]
-    dz = sums[v, 3] / sums[v, 0] - X[v, 2]
+    dx = sums[v, 1] / sums[v, 0] - P[v, 0]
+    dy = sums[v, 2] / sums[v, 0] - P[v, 1]
+    dz = sums[v, 3] / sums[v, 0] - P[v, 2]
     along = dx * nx + dy * ny + dz * nz
     dx -= along * nx
     dy -= along * ny
     dz -= along * nz
     if stiffness > 0.0 and sums[v, 14] > 0.0:
         dx, dy, dz = _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness)
-    X[v, 0] += dx
-    X[v, 1] += dy
-    X[v, 2] += dz
+    return dx, dy, dz
 
 
 @inlined

@@ -13,10 +13,22 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined, kernel
-from .._types import BOUNDARY, DEAD, INNER, NONE, Blocks, Mesh
+from .._types import (
+    CURVE,
+    DEAD,
+    FIXED,
+    FROZEN,
+    HELD,
+    INNER,
+    NONE,
+    SEAM,
+    Blocks,
+    IndexArray,
+    Mesh,
+)
 from ..geometry import distance_squared, face_vector
 
-__all__ = ["MAX_ROUNDS", "compact", "split_long_edges"]
+__all__ = ["MAX_ROUNDS", "compact", "split_edges", "split_long_edges"]
 
 # Every round halves the longest edge: 64 rounds divide any float64 length below any other.
 MAX_ROUNDS = 64
@@ -76,9 +88,15 @@ _COUNT, _CORNER, _INNER, _PART, _GAIN = _build_templates()
 
 
 def split_long_edges(
-    mesh: Mesh, blocks: Blocks, longest: float, parallel: bool
+    mesh: Mesh,
+    blocks: Blocks,
+    factor: float,
+    parallel: bool,
+    siblings: tuple[IndexArray, IndexArray] | None = None,
 ) -> tuple[Mesh, int]:
-    """Split every edge longer than ``longest``, once.
+    """Split every edge longer than ``factor`` times its target length, once.
+
+    Siblings (see `polyline.find_siblings`) are split together.
 
     Returns
     -------
@@ -89,8 +107,29 @@ def split_long_edges(
     """
     asked = np.empty(mesh.origin.size // 3, np.uint8)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _ask_for_splits(parallel, mesh, blocks, longest * longest, asked, count)
-    return _refine(mesh, blocks, asked, parallel) if count.any() else (mesh, 0)
+    _ask_for_splits(parallel, mesh, blocks, 0.5 * factor, asked, count)
+    if not count.any():
+        return mesh, 0
+    if siblings is not None:
+        _ask_siblings(asked, *siblings)
+    return _refine(mesh, blocks, asked, parallel)
+
+
+def split_edges(mesh: Mesh, blocks: Blocks, edges: IndexArray, parallel: bool) -> Mesh:
+    """Split the given half-edges, whatever their length."""
+    asked = np.zeros(mesh.origin.size // 3, np.uint8)
+    asked[mesh.origin[::3] == DEAD] = _GONE
+    np.bitwise_or.at(asked, edges // 3, (1 << (edges % 3)).astype(np.uint8))
+    return _refine(mesh, blocks, asked, parallel)[0]
+
+
+def _ask_siblings(asked: np.ndarray, members: IndexArray, group: IndexArray) -> None:
+    """Let all faces around an edge with siblings ask for its split if one does."""
+    if len(members):
+        bit = (1 << (members % 3)).astype(np.uint8)
+        wanted = np.bitwise_or.reduceat((asked[members // 3] & bit) != 0, group[:-1])
+        wanted = np.repeat(wanted, np.diff(group))
+        np.bitwise_or.at(asked, members[wanted] // 3, bit[wanted])
 
 
 def compact(mesh: Mesh, blocks: Blocks, parallel: bool) -> Mesh:
@@ -115,6 +154,8 @@ def _refine(mesh: Mesh, blocks: Blocks, asked: np.ndarray, parallel: bool) -> tu
     refined = Mesh(
         np.empty(3 * n_faces, np.int32),
         np.empty(3 * n_faces, np.int32),
+        np.empty(3 * n_faces, np.int32),
+        np.empty(n_faces, np.int32),
         np.empty(n_vertices, np.int32),
         np.empty(n_vertices, np.int32),
         np.empty((n_vertices, 4)),
@@ -123,16 +164,16 @@ def _refine(mesh: Mesh, blocks: Blocks, asked: np.ndarray, parallel: bool) -> tu
     )
     _number(parallel, mesh, blocks, mask, starts, first_child, new_vertex, middle)
     numbers = (mask, first_child, new_vertex, middle)
-    _write_faces(parallel, mesh, blocks, *numbers, refined.origin, refined.twin)
-    _write_vertices(parallel, mesh, blocks, *numbers, *refined[2:])
+    _write_faces(parallel, mesh, blocks, *numbers, *refined[:4])
+    _write_vertices(parallel, mesh, blocks, *numbers, *refined[4:])
     if n_split:
         _update_valences(mesh, mask, new_vertex, middle, refined)
     return refined, n_split
 
 
 @driver
-def _ask_for_splits(mesh, blocks, longest_squared, asked, count):
-    """Mask of the edges that each face wants split: the too long ones.
+def _ask_for_splits(mesh, blocks, half_factor, asked, count):
+    """Mask of the edges that each face wants split: the too long ones that are not frozen.
 
     A face lower than half the limit wants only its longest edge split: all three at once, a needle of
     length l would fall into (l / L)^2 faces instead of 2 l / L.
@@ -141,24 +182,37 @@ def _ask_for_splits(mesh, blocks, longest_squared, asked, count):
         for f in range(blocks.face[k], blocks.face[k + 1]):
             asked[f] = _GONE
             if mesh.origin[3 * f] != DEAD:
-                a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
-                asked[f] = _long_edges(mesh.X, a, b, c, longest_squared)
+                asked[f] = _long_edges(mesh, f, half_factor)
                 count[k] += asked[f] != 0
 
 
 @inlined
-def _long_edges(X, a, b, c, longest_squared):
+def _long_edges(mesh, f, half_factor):
+    X = mesh.X
+    a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
     l0 = distance_squared(X, a, b)
     l1 = distance_squared(X, b, c)
     l2 = distance_squared(X, c, a)
-    mask = (l0 > longest_squared) + 2 * (l1 > longest_squared) + 4 * (l2 > longest_squared)
+    m0 = half_factor * (X[a, 3] + X[b, 3])
+    m1 = half_factor * (X[b, 3] + X[c, 3])
+    m2 = half_factor * (X[c, 3] + X[a, 3])
+    mask = (l0 > m0 * m0) + 2 * (l1 > m1 * m1) + 4 * (l2 > m2 * m2)
+    if mask == 0:
+        return mask
+    for i in range(3):
+        if mesh.curve[3 * f + i] == FROZEN:
+            mask &= ~(1 << i)
     if mask == 0 or mask == 1 or mask == 2 or mask == 4:
         return mask
     nx, ny, nz = face_vector(
         X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
     )
+    l0 *= mask & 1
+    l1 *= (mask >> 1) & 1
+    l2 *= (mask >> 2) & 1
     longest = max(l0, l1, l2)
-    if nx * nx + ny * ny + nz * nz >= 0.25 * longest_squared * longest:
+    limit = (m0 + m1 + m2) / 3.0
+    if nx * nx + ny * ny + nz * nz >= 0.25 * limit * limit * longest:
         return mask
     return 1 if l0 == longest else (2 if l1 == longest else 4)
 
@@ -238,7 +292,9 @@ def _number(mesh, blocks, mask, starts, first_child, new_vertex, middle):
 
 
 @driver
-def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, origin, twin):
+def _write_faces(
+    mesh, blocks, mask, first_child, new_vertex, middle, origin, twin, curve, source
+):
     """Write children and their twins: inside a template from its table, across by parts of edges."""
     for k in prange(blocks.face.size - 1):
         ids = np.empty(6, np.int64)
@@ -256,8 +312,13 @@ def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, origin, tw
                 origin[base], origin[base + 1], origin[base + 2] = ids[0], ids[1], ids[2]
                 for i in range(3):
                     twin[base + i] = _part_of(mesh.twin[3 * f + i], 0, mask, first_child)
+                    curve[base + i] = mesh.curve[3 * f + i]
+                source[base // 3] = mesh.source[f]
                 continue
+            for j in range(_COUNT[m]):
+                source[base // 3 + j] = mesh.source[f]
             for j in range(3 * _COUNT[m]):
+                curve[base + j] = NONE
                 origin[base + j] = ids[_CORNER[m, j]]
                 twin[base + j] = base + _INNER[m, j] if _INNER[m, j] >= 0 else NONE
             for i in range(3):
@@ -265,8 +326,10 @@ def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, origin, tw
                 half = (m >> i) & 1
                 t = mesh.twin[3 * f + i]
                 twin[base + _PART[m, 2 * i]] = _part_of(t, half, mask, first_child)
+                curve[base + _PART[m, 2 * i]] = mesh.curve[3 * f + i]
                 if half:
                     twin[base + _PART[m, 2 * i + 1]] = _part_of(t, 0, mask, first_child)
+                    curve[base + _PART[m, 2 * i + 1]] = mesh.curve[3 * f + i]
 
 
 @inlined
@@ -309,10 +372,29 @@ def _write_vertices(
                     halfedge[new] = base + _PART[m, 2 * i + 1]
                     # No face yet: `_update_valences` adds them. A boundary has an edge more.
                     excess[new] = -6 if inner else -3
-                    kind[new] = INNER if inner else BOUNDARY
-                    birth[new] = mesh.birth[v]
+                    kind[new] = INNER if mesh.curve[h] == NONE else CURVE
+                    birth[new] = _birth_between(mesh, h, v, w)
                     for j in range(4):
                         X[new, j] = 0.5 * (mesh.X[v, j] + mesh.X[w, j])
+
+
+@inlined
+def _birth_between(mesh, h, v, w):
+    """Where on the reference a midpoint is looked for: on the curve of its edge, or in its patch.
+
+    Both half-edges of an edge, and all siblings of a seam, give the same answer.
+    """
+    c = mesh.curve[h]
+    if c == NONE:
+        # The birth of a vertex on a curve may be a face on the other side.
+        if mesh.kind[v] <= HELD:
+            return mesh.birth[v]
+        return mesh.birth[w] if mesh.kind[w] <= HELD else np.int32(3 * mesh.source[h // 3])
+    slides_v = CURVE <= mesh.kind[v] < FIXED
+    slides_w = CURVE <= mesh.kind[w] < FIXED
+    if slides_v:
+        return min(mesh.birth[v], mesh.birth[w]) if slides_w else mesh.birth[v]
+    return mesh.birth[w] if slides_w else np.int32(c & (SEAM - 1))
 
 
 @kernel

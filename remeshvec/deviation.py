@@ -1,0 +1,162 @@
+"""The guard of `max_deviation`: samples of both surfaces, and what to hold where they lie too far apart.
+
+A sweep is tried on a copy. Samples of the new mesh must lie near the input, samples of the input near
+the new mesh; where one does not, the vertices and edges of the mesh before the sweep are held around it,
+and the sweep is run again. So no operation needs to know, whatever moved the surface.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._types import (
+    CURVE,
+    DEAD,
+    FROZEN,
+    HELD,
+    INNER,
+    NONE,
+    PINNED,
+    FloatArray,
+    IndexArray,
+    Mesh,
+    Tree,
+)
+from .bvh import build_tree, closest_faces
+from .reference import Built
+
+__all__ = ["DeviationGuard", "sample_mesh"]
+
+# Barycentric coordinates of the samples of a face besides its vertices: the middles of its edges, its
+# centroid, and the centroids of its quarters at the corners.
+_WITHIN = np.array(
+    [
+        [1 / 2, 1 / 2, 0],
+        [0, 1 / 2, 1 / 2],
+        [1 / 2, 0, 1 / 2],
+        [1 / 3, 1 / 3, 1 / 3],
+        [2 / 3, 1 / 6, 1 / 6],
+        [1 / 6, 2 / 3, 1 / 6],
+        [1 / 6, 1 / 6, 2 / 3],
+    ]
+)
+
+# Samples must keep this share of the distance: between them it may be a little more.
+_SHARE = 0.9
+
+
+def sample_mesh(X: FloatArray, F: IndexArray) -> tuple[FloatArray, IndexArray]:
+    """Sample a mesh: at its corners and at seven points of every face.
+
+    Returns
+    -------
+    points : (10 m, 3) float64
+        Those of a face together.
+    face : (10 m,) int32
+    """
+    weights = np.concatenate([np.eye(3), _WITHIN])
+    points = np.einsum("kc,mcx->mkx", weights, X[F, :3]).reshape(-1, 3)
+    return points, np.repeat(np.arange(len(F), dtype=np.int32), len(weights))
+
+
+class DeviationGuard:
+    """Compares meshes with the input, and holds what must not go on.
+
+    Parameters
+    ----------
+    built : Built
+    distance : float
+        Largest deviation, in the frame of the meshes.
+    parallel : bool
+    """
+
+    def __init__(self, built: Built, distance: float, parallel: bool) -> None:
+        self.reference = built.reference
+        self.distance = distance
+        self.parallel = parallel
+        F = self.reference.origin.reshape(-1, 3)
+        self.samples, _ = sample_mesh(self.reference.X, F)
+        self.before: Tree | None = None
+
+    def remember(self, mesh: Mesh) -> None:
+        """Take note of a mesh, compact, before it is changed."""
+        self.before = _tree_of(mesh, self.parallel)
+
+    def distances(self, mesh: Mesh, trust: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distances of samples: of the mesh from the input, and of the input from the mesh.
+
+        Returns
+        -------
+        points : (k, 3) float64
+            Samples of the mesh.
+        to_input : (k,) float64
+            Within ``trust`` an upper bound; likewise the next.
+        from_input : (j,) float64
+            For `samples`.
+        """
+        alive = mesh.origin[::3] != DEAD
+        F = mesh.origin.reshape(-1, 3)[alive]
+        points, face = sample_mesh(mesh.X, F)
+        hint = _hints(mesh, F, mesh.source[alive])[face]
+        _, to_input = closest_faces(self.reference.tree, points, hint, trust, self.parallel)
+        tree = _tree_of(mesh, self.parallel)
+        anywhere = np.full(len(self.samples), NONE, np.int32)
+        _, from_input = closest_faces(tree, self.samples, anywhere, trust, self.parallel)
+        return points, to_input, from_input
+
+    def offenders(self, mesh: Mesh) -> FloatArray:
+        """Samples of either surface that lie too far from the other, (k, 3)."""
+        limit = _SHARE * self.distance
+        points, to_input, from_input = self.distances(mesh, limit)
+        return np.concatenate([points[to_input > limit], self.samples[from_input > limit]])
+
+    def hold(self, mesh: Mesh, points: FloatArray, rings: int) -> None:
+        """Hold the mesh that was remembered around points, and so many rings of faces more."""
+        assert self.before is not None
+        anywhere = np.full(len(points), NONE, np.int32)
+        faces, _ = closest_faces(self.before, points, anywhere, 0.0, self.parallel)
+        F = mesh.origin.reshape(-1, 3)
+        is_held = np.zeros(len(mesh.X), np.bool_)
+        is_held[F[faces]] = True
+        for _ in range(rings):
+            is_held[F[is_held[F].any(axis=1)]] = True
+        _agree_on_seams(mesh, is_held)
+        mesh.kind[is_held & (mesh.kind == INNER)] = HELD
+        mesh.kind[is_held & (mesh.kind == CURVE)] = PINNED
+        ends = is_held[mesh.origin] & is_held[F[:, [1, 2, 0]].ravel()]
+        mesh.curve[ends & (mesh.curve == NONE)] = FROZEN
+
+    def measure(self, mesh: Mesh) -> dict[str, float]:
+        """Largest distance of a sample, each way."""
+        _, to_input, from_input = self.distances(mesh, 0.0)
+        return {"to_input": float(to_input.max()), "from_input": float(from_input.max())}
+
+
+def _tree_of(mesh: Mesh, parallel: bool) -> Tree:
+    alive = mesh.origin[::3] != DEAD
+    F = mesh.origin.reshape(-1, 3)[alive]
+    new = np.cumsum(alive) - 1
+    twin = mesh.twin.reshape(-1, 3)[alive].ravel()
+    twin = np.where(twin == NONE, NONE, 3 * new[twin // 3] + twin % 3).astype(np.int32)
+    return build_tree(mesh.X, F, twin, np.zeros(len(F), np.int32), parallel)
+
+
+def _hints(mesh: Mesh, F: IndexArray, source: IndexArray) -> IndexArray:
+    """Faces of the reference to start at: where an inner corner was born, or any of the patch."""
+    hint = source.copy()
+    for corner in range(3):
+        v = F[:, corner]
+        hint = np.where(mesh.kind[v] <= HELD, mesh.birth[v] // 3, hint)
+    return hint.astype(np.int32)
+
+
+def _agree_on_seams(mesh: Mesh, is_held: NDArray[np.bool_]) -> None:
+    """Hold all vertices that lie where a held one lies on a boundary: sheets may share it."""
+    h = np.flatnonzero(mesh.twin == NONE)
+    border = np.unique(mesh.origin[h])
+    if len(border):
+        _, place = np.unique(mesh.X[border, :3], axis=0, return_inverse=True)
+        held = np.zeros(len(border), np.bool_)
+        held[place.reshape(-1)[is_held[border]]] = True
+        is_held[border] = held[place.reshape(-1)]

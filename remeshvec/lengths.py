@@ -1,0 +1,200 @@
+"""Target lengths on the mesh, from what the caller asks for, and a check of what they would make."""
+
+from __future__ import annotations
+
+from math import isfinite, sqrt
+from numbers import Real
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._jit import kernel
+from ._types import FloatArray
+from .creases import find_creases
+from .errors import MeshInputError, OptionError
+from .geometry import distance_squared, face_vector
+from .halfedge import following
+from .prepare import Prepared
+from .sizing import Adaptive, adaptive_lengths, expected_faces, limit_gradation, target_lengths
+
+__all__ = ["Measures", "check_gradation", "measure", "set_lengths"]
+
+# Longest target length in the frame of `Prepared`, where the mesh has an extent below 2: longer ones
+# mean the same, and their squares might overflow.
+_LONGEST = 1e6
+
+# Edges of a remeshed surface are on average as long as the target, and its faces about equilateral.
+_FACE = sqrt(3.0) / 4.0
+
+
+class Measures(NamedTuple):
+    """Size of a mesh, in the frame of `Prepared`."""
+
+    area: float
+    mean_edge: float
+    coordinate: float  # how far from the origin of the input it lies
+
+
+def measure(prepared: Prepared) -> Measures:
+    """Measure a prepared mesh; notes its faces without area.
+
+    Raises
+    ------
+    MeshInputError
+        No face has an area.
+    """
+    area, mean_edge, flat = _measure(prepared.mesh)
+    if flat:
+        prepared.dirt["zero_area_faces"] = flat
+    if not area > 0.0:
+        raise MeshInputError("all faces of F have no area: there is no surface to remesh")
+    far = float(np.abs(prepared.centre).max()) * prepared.scale + 1.0
+    return Measures(area, mean_edge, far)
+
+
+def check_gradation(value: Any) -> float:
+    """Check the bound for the ratio of neighbouring lengths."""
+    is_number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
+    if not is_number or not isfinite(value) or not value > 1.0:
+        raise OptionError(
+            f"gradation must be a number above 1, the largest ratio of neighbouring lengths; "
+            f"got {value!r}"
+        )
+    return float(value)
+
+
+def set_lengths(
+    prepared: Prepared,
+    measures: Measures,
+    V: FloatArray,
+    L: Any,
+    hard: NDArray[np.bool_],
+    feature_angle: float | str | None,
+    gradation: float,
+    max_faces: int,
+) -> float:
+    """Write target lengths to the last column of ``X``; returns the length of the mean new face.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    measures : Measures
+    V : (n, 3) float64
+        The caller's vertices.
+    L : None, number, array, callable or Adaptive
+        In the units of ``V``.
+    hard : (3 m,) bool
+        Half-edges that are features whatever their angle; an adaptive length is not smoothed over them.
+    feature_angle : float, "auto" or None
+    gradation : float
+    max_faces : int
+
+    Raises
+    ------
+    OptionError
+        No positive lengths, more than ``max_faces`` faces, or lengths below the precision of the
+        coordinates.
+    """
+    X = prepared.mesh.X
+    if isinstance(L, Adaptive):
+        lengths = _adaptive(prepared, measures, L, hard, feature_angle)
+    else:
+        asked = target_lengths(V, L) if L is not None else 0.9 * measures.mean_edge / prepared.scale
+        if not isinstance(asked, np.ndarray):
+            X[:, 3] = _in_range(asked * prepared.scale)
+            _check_output(prepared, measures, measures.area / X[0, 3] ** 2 / _FACE, max_faces)
+            return float(X[0, 3])
+        lengths = _in_range(asked[prepared.vertex_source] * prepared.scale)
+    X[:, 3] = _limited(prepared, lengths, gradation)
+    expected = expected_faces(X, prepared.mesh.origin, X[:, 3])
+    _check_output(prepared, measures, expected, max_faces)
+    return sqrt(measures.area / (expected * _FACE))
+
+
+def _in_range(lengths: Any) -> Any:
+    """Cut lengths off that are longer than any mesh, or that have underflown to zero."""
+    return np.clip(lengths, 5e-324, _LONGEST)
+
+
+def _adaptive(
+    prepared: Prepared,
+    measures: Measures,
+    spec: Adaptive,
+    hard: NDArray[np.bool_],
+    feature_angle: float | str | None,
+) -> FloatArray:
+    mesh = prepared.mesh
+    shortest, longest = spec.limits(float(np.ptp(mesh.X[:, :3], axis=0).max()) / prepared.scale)
+    shortest, longest = shortest * prepared.scale, longest * prepared.scale
+    # Creases are sought at the scale of the input's edges: the lengths follow from them.
+    mesh.X[:, 3] = min(max(measures.mean_edge, shortest), longest)
+    arrays = (mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge)
+    is_feature, _ = find_creases(*arrays, hard, feature_angle)
+    return adaptive_lengths(*arrays, is_feature, spec.tolerance * prepared.scale, shortest, longest)
+
+
+def _limited(prepared: Prepared, lengths: FloatArray, gradation: float) -> FloatArray:
+    """Bound the growth of lengths, also from sheet to sheet where they meet."""
+    mesh, source = prepared.mesh, prepared.vertex_source
+    copies = len(source) > len(np.unique(source))
+    arrays = (mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge)
+    for _ in range(16):
+        lengths = limit_gradation(*arrays, lengths, gradation)
+        if not copies:
+            break
+        shared = np.full(int(source.max()) + 1, np.inf)
+        np.minimum.at(shared, source, lengths)
+        before, lengths = lengths, shared[source]
+        if (before == lengths).all():
+            break
+    return lengths
+
+
+def _check_output(
+    prepared: Prepared, measures: Measures, expected: float, max_faces: int
+) -> None:
+    X, scale = prepared.mesh.X, prepared.scale
+    shortest = float(X[:, 3].min())
+    what = f"L = {shortest / scale:g}"
+    if X[:, 3].max() > shortest:
+        what = f"L from {shortest / scale:g} to {X[:, 3].max() / scale:g}"
+    if not expected <= max_faces:
+        raise OptionError(
+            f"{what} would give about {expected:.3g} faces, more than "
+            f"max_faces = {max_faces:,}; the mean edge of the input is "
+            f"{measures.mean_edge / scale:g}"
+        )
+    if shortest < 1e3 * np.finfo(float).eps * measures.coordinate:
+        raise OptionError(
+            f"{what} is below the precision of coordinates near "
+            f"{measures.coordinate / scale:g}; move the mesh to the origin"
+        )
+
+
+@kernel
+def _measure(mesh):
+    """Total area, mean edge length, number of faces without area."""
+    X = mesh.X
+    area = 0.0
+    edges = 0.0
+    count = 0
+    flat = 0
+    for f in range(mesh.origin.size // 3):
+        a = mesh.origin[3 * f]
+        b = mesh.origin[3 * f + 1]
+        c = mesh.origin[3 * f + 2]
+        nx, ny, nz = face_vector(
+            X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
+        )
+        face_area = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
+        area += face_area
+        if face_area == 0.0:
+            flat += 1
+        for h in range(3 * f, 3 * f + 3):
+            if mesh.twin[h] < h:
+                edges += np.sqrt(
+                    distance_squared(X, mesh.origin[h], mesh.origin[following(np.int64(h))])
+                )
+                count += 1
+    return area, edges / count, flat

@@ -1,0 +1,91 @@
+"""Unfold: take back the moves that turned faces beside curves over.
+
+The middle of a ring lies outside where a curve is concave, or where the ring hangs on an edge that must
+not be split. All vertices move at once, so this shows only afterwards. Away from curves nothing is
+taken back: that would keep the folds of the input.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from .._jit import driver
+from .._types import CURVE, DEAD, INNER, Blocks, FloatArray, Mesh
+from ..geometry import face_vector, turn_exceeds
+
+__all__ = ["undo_folds"]
+
+# A face may turn by 60 degrees.
+_COSINE = 0.5
+
+
+def undo_folds(mesh: Mesh, blocks: Blocks, before: FloatArray, parallel: bool) -> int:
+    """Put inner vertices back of faces at curves that turned too far; returns how many vertices.
+
+    Repeated until there are none: what is put back may fold a neighbour.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    blocks : Blocks
+    before : (n, 3) or (n, 4) float64
+        Where the vertices were.
+    parallel : bool
+    """
+    total = 0
+    marked = np.zeros(mesh.vertex_halfedge.size, np.uint8)
+    while True:
+        found = np.zeros(len(blocks.face) - 1, np.int64)
+        _find_folds(parallel, mesh, blocks, before, marked, found)
+        if not found.any():
+            return total
+        count = np.zeros(len(blocks.face) - 1, np.int64)
+        _put_back(parallel, mesh, blocks, before, marked, mesh.X, count)
+        if not count.any():
+            return total
+        total += int(count.sum())
+
+
+@driver
+def _find_folds(mesh, blocks, before, marked, found):
+    """Mark the corners of folded faces; blocks may mark the same vertex, with the same value."""
+    X = mesh.X
+    for k in prange(blocks.face.size - 1):
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            a = mesh.origin[3 * f]
+            if a == DEAD:
+                continue
+            b = mesh.origin[3 * f + 1]
+            c = mesh.origin[3 * f + 2]
+            if max(mesh.kind[a], mesh.kind[b], mesh.kind[c]) < CURVE:
+                continue
+            ux, uy, uz = face_vector(
+                before[a, 0], before[a, 1], before[a, 2],
+                before[b, 0], before[b, 1], before[b, 2],
+                before[c, 0], before[c, 1], before[c, 2],
+            )  # fmt: skip
+            wx, wy, wz = face_vector(
+                X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
+            )
+            if ux * ux + uy * uy + uz * uz > 0.0 and turn_exceeds(ux, uy, uz, wx, wy, wz, _COSINE):
+                marked[a] = 1
+                marked[b] = 1
+                marked[c] = 1
+                found[k] += 1
+
+
+@driver
+def _put_back(mesh, blocks, before, marked, X, count):
+    for k in prange(blocks.vertex.size - 1):
+        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
+            if marked[v] == 0:
+                continue
+            marked[v] = 0
+            if mesh.kind[v] == INNER and (
+                X[v, 0] != before[v, 0] or X[v, 1] != before[v, 1] or X[v, 2] != before[v, 2]
+            ):
+                X[v, 0] = before[v, 0]
+                X[v, 1] = before[v, 1]
+                X[v, 2] = before[v, 2]
+                count[k] += 1

@@ -1,0 +1,304 @@
+"""The sweeps of one call and what comes after them: split, collapse, flip, relax, project; finish."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, radians
+from typing import Any
+
+import numpy as np
+
+from ._types import (
+    CURVE,
+    DEAD,
+    HELD,
+    INNER,
+    NONE,
+    PINNED,
+    SEAM,
+    Blocks,
+    FloatArray,
+    IndexArray,
+    Mesh,
+)
+from .clean import weld_vertices
+from .deviation import DeviationGuard
+from .edge_sets import make_blocks
+from .operations.collapse import CollapseLimits, collapse_short_edges, collapse_siblings
+from .operations.fit import fit_vertices
+from .operations.flip import FlipLimits, flip_edges
+from .operations.project import locate_vertices, project_curves, project_vertices, read_lengths
+from .operations.relax import relax_vertices
+from .operations.split import MAX_ROUNDS, compact, split_edges, split_long_edges
+from .operations.unfold import undo_folds
+from .operations.untangle import untangle_vertices
+from .options import Options
+from .polyline import find_siblings
+from .reference import Built
+from .report import Stopwatch
+
+__all__ = ["Callback", "Sweeps", "seam_vertices"]
+
+Callback = Callable[[int, str, int], Any]
+
+# Below this a parallel region costs more than it saves when another process holds a core.
+_PARALLEL_FACES = 50_000
+
+# Vertices that a walk brings this close to the input, as a share of the target length, are not checked
+# against the whole of their patch.
+_TRUST = 0.05
+
+# How far a fit may move a vertex, likewise.
+_FIT_REACH = 0.2
+
+# Times that a sweep is tried with more of the mesh held, before it is left out.
+_ATTEMPTS = 8
+
+
+class Sweeps:
+    """The sweeps of one call: options in, counts and seconds out."""
+
+    def __init__(
+        self, options: Options, watch: Stopwatch, may_run: bool, callback: Callback | None
+    ) -> None:
+        self.options = options
+        self.watch = watch
+        self.may_run = may_run
+        self.callback = callback
+        self.scale = 1.0  # of the frame that meshes come in
+        self.guard: DeviationGuard | None = None
+        self.deviation: dict[str, float] = {}
+        self.counts: list[dict[str, int]] = []
+        self.stop = "all sweeps done"
+
+    def is_parallel(self, n_faces: int) -> bool:
+        """Tell whether a mesh of so many faces is worth more than one thread."""
+        return self.may_run and n_faces >= _PARALLEL_FACES
+
+    def run(self, mesh: Mesh, built: Built) -> Mesh:
+        """Run all sweeps, or until little changes, or until the callback ends them."""
+        blocks = make_blocks(mesh)
+        varies = bool(np.ptp(mesh.X[:, 3]) > 0.0)
+        self.counts = []
+        self.guard = self._make_guard(mesh, built)
+        for sweep in range(self.options.iterations):
+            self.counts.append({})
+            mesh, blocks = self._split(mesh, blocks, built, self.options.split[sweep])
+            if self._is_cancelled(sweep, "split"):
+                break
+            if self.guard is not None:
+                mesh = compact(mesh, blocks, self.is_parallel(mesh.origin.size // 3))
+                blocks = make_blocks(mesh)
+            mesh, step = self._guarded(
+                mesh, lambda m, b=blocks, s=sweep: self._change(m, b, built, s, varies)
+            )
+            if self.stop == "cancelled" or self._has_converged(mesh, step):
+                break
+        return mesh
+
+    def _make_guard(self, mesh: Mesh, built: Built) -> DeviationGuard | None:
+        if self.options.max_deviation is None:
+            return None
+        distance = self.options.max_deviation * self.scale
+        return DeviationGuard(built, distance, self.is_parallel(mesh.origin.size // 3))
+
+    def _guarded(self, mesh: Mesh, change: Callable[[Mesh], float]) -> tuple[Mesh, float]:
+        """Change a mesh; where that leads too far from the input, hold the mesh there and try again.
+
+        Returns the mesh and what ``change`` returned.
+        """
+        if self.guard is None:
+            return mesh, change(mesh)
+        with self.watch.time("deviation"):
+            self.guard.remember(mesh)
+        counts = self.counts[-1].copy()
+        for attempt in range(_ATTEMPTS):
+            trial = Mesh(*(array.copy() for array in mesh))
+            self.counts[-1] = counts.copy()
+            result = change(trial)
+            with self.watch.time("deviation"):
+                offenders = self.guard.offenders(trial)
+                if not len(offenders):
+                    return trial, result
+                self.guard.hold(mesh, offenders, attempt)
+        self.counts[-1] = counts
+        return mesh, np.inf
+
+    def _change(
+        self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, varies: bool
+    ) -> float:
+        """Run the phases that change the mesh in place.
+
+        Returns the root mean square of the steps of all vertices, in target lengths. Their maximum
+        never comes down: wherever a single edge is flipped, vertices move.
+        """
+        self._connect(mesh, blocks, built, sweep)
+        if self.stop == "cancelled":
+            return np.inf
+        before = mesh.X[:, :3].copy() if self.options.tol is not None else None
+        self._move(mesh, blocks, built, sweep, varies)
+        self._is_cancelled(sweep, "relax")
+        if before is None:
+            return np.inf
+        alive = mesh.vertex_halfedge != DEAD
+        step = mesh.X[alive, :3] - before[alive]
+        return float(np.sqrt(((step * step).sum(axis=1) / mesh.X[alive, 3] ** 2).mean()))
+
+    def _split(
+        self, mesh: Mesh, blocks: Blocks, built: Built, factor: float
+    ) -> tuple[Mesh, Blocks]:
+        """Split by rounds until no edge is too long."""
+        count = 0
+        with self.watch.time("split"):
+            for _ in range(MAX_ROUNDS):
+                parallel = self.is_parallel(mesh.origin.size // 3)
+                siblings = None if built.on_seam is None else _siblings(mesh)
+                mesh, n_split = split_long_edges(mesh, blocks, factor, parallel, siblings)
+                if not n_split:
+                    break
+                blocks = make_blocks(mesh)
+                count += n_split
+        self.counts[-1]["split"] = count
+        return mesh, blocks
+
+    def _connect(self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int) -> None:
+        """Collapse and flip."""
+        options = self.options
+        parallel = self.is_parallel(mesh.origin.size // 3)
+        limits = CollapseLimits(
+            options.collapse[sweep],
+            options.split[sweep],
+            options.foldover_cosine,
+            options.quadric_reach,
+            options.sliver_check,
+        )
+        with self.watch.time("collapse"):
+            tally = collapse_short_edges(mesh, blocks, limits, parallel)
+            self.counts[-1]["collapse"] = int(tally[0])
+            if built.on_seam is not None:
+                self.counts[-1]["collapse"] += collapse_siblings(mesh, *_siblings(mesh), limits)
+        if self._is_cancelled(sweep, "collapse"):
+            return
+        flips = FlipLimits(
+            cos(radians(options.flip_normal)), options.delaunay_ties, options.sliver_check
+        )
+        with self.watch.time("flip"):
+            for _ in range(options.flip_passes):
+                tally = flip_edges(mesh, blocks, flips, parallel)
+                self.counts[-1]["flip"] = self.counts[-1].get("flip", 0) + int(tally[0])
+        self._is_cancelled(sweep, "flip")
+
+    def _move(self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, varies: bool) -> None:
+        """Relax and project."""
+        options = self.options
+        left = options.iterations - sweep
+        parallel = self.is_parallel(mesh.origin.size // 3)
+        before = mesh.X.copy() if built.has_curves else None
+        with self.watch.time("relax"):
+            for _ in range(options.last_relaxations if left == 1 else 1):
+                relax_vertices(mesh, blocks, options.stiffness, parallel)
+        with self.watch.time("project"):
+            must = self.guard is not None or options.tol is not None
+            if options.project and (must or left <= options.projected_sweeps):
+                project_vertices(mesh, blocks, built.reference, _TRUST, parallel)
+            else:
+                project_curves(mesh, blocks, built.reference, parallel)
+            if before is not None:
+                undo_folds(mesh, blocks, before, parallel)
+            if varies:
+                read_lengths(mesh, blocks, built.reference, parallel)
+
+    def finish(self, mesh: Mesh, built: Built) -> tuple[Mesh, FloatArray]:
+        """Untangle, fit, and find where on the input every vertex lies."""
+        options, reference = self.options, built.reference
+        parallel = self.is_parallel(mesh.origin.size // 3)
+        with self.watch.time("extract"):
+            mesh = compact(mesh, make_blocks(mesh), parallel)
+            mesh.kind[mesh.kind == HELD] = INNER
+            mesh.kind[mesh.kind == PINNED] = CURVE
+            if built.on_seam is not None:
+                mesh = _separate_sheets(mesh, built)
+            blocks = make_blocks(mesh)
+        with self.watch.time("finish"):
+            mesh, _ = self._guarded(mesh, lambda m: self._polish(m, blocks, built, parallel))
+        if self.guard is not None:
+            with self.watch.time("deviation"):
+                measured = self.guard.measure(mesh)
+                self.deviation = {way: d / self.scale for way, d in measured.items()}
+        with self.watch.time("locate"):
+            is_on_input = options.project and not options.fit_rounds
+            trust = np.inf if is_on_input else _TRUST * float(mesh.X[:, 3].mean())
+            barycentric = locate_vertices(mesh, blocks, reference, trust, parallel)
+        return mesh, barycentric
+
+    def _polish(self, mesh: Mesh, blocks: Blocks, built: Built, parallel: bool) -> float:
+        """Move vertices for the last time."""
+        options, tree = self.options, built.reference.tree
+        if options.project:
+            before = mesh.X.copy()
+            project_vertices(mesh, blocks, built.reference, 0.0, parallel)
+            undo_folds(mesh, blocks, before, parallel)
+        cosine = cos(radians(options.untangle_angle))
+        for _ in range(options.untangle_rounds):
+            untangle_vertices(mesh, blocks, tree, options.project, cosine, parallel)
+        for _ in range(options.fit_rounds):
+            fit_vertices(mesh, blocks, tree, _FIT_REACH, parallel)
+        return 0.0
+
+    def _has_converged(self, mesh: Mesh, step: float) -> bool:
+        """Tell whether a sweep changed few edges and hardly moved the vertices."""
+        tol = self.options.tol
+        if tol is None or step > tol:
+            return False
+        n_edges = 1.5 * np.count_nonzero(mesh.origin[::3] != DEAD)
+        if sum(self.counts[-1].values()) > tol * n_edges:
+            return False
+        self.stop = (
+            f"converged (tol): the last sweep changed less than {tol:g} of the edges and moved "
+            f"vertices by less than {tol:g} L"
+        )
+        return True
+
+    def _is_cancelled(self, sweep: int, phase: str) -> bool:
+        if self.callback is None:
+            return False
+        if self.callback(sweep, phase, self.counts[-1].get(phase, 0)) is False:
+            self.stop = "cancelled"
+        return self.stop == "cancelled"
+
+
+def _siblings(mesh: Mesh) -> tuple[IndexArray, IndexArray]:
+    """Half-edges on seams that may change, by groups of siblings."""
+    h = np.flatnonzero((mesh.curve >= SEAM) & (mesh.origin != DEAD)).astype(np.int32)
+    return find_siblings(mesh.X, mesh.origin, h)
+
+
+def seam_vertices(mesh: Mesh, built: Built) -> IndexArray:
+    """Vertices where sheets meet, those of all sheets."""
+    if built.on_seam is None:
+        return np.empty(0, np.int32)
+    h = np.flatnonzero((mesh.twin == NONE) & (mesh.origin != DEAD))
+    ends = np.concatenate([mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]])
+    ends = np.unique(ends)
+    return ends[built.on_seam[built.reference.origin[mesh.birth[ends]]]]
+
+
+def _separate_sheets(mesh: Mesh, built: Built) -> Mesh:
+    """Split inner edges that would run beside an edge of another sheet once the sheets are welded."""
+    on_seam = seam_vertices(mesh, built)
+    target = weld_vertices(mesh.X[:, :3], on_seam)
+    if target is None:
+        return mesh
+    is_on_seam = np.zeros(len(mesh.X), np.bool_)
+    is_on_seam[on_seam] = True
+    ends = mesh.origin, mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    h = np.flatnonzero(
+        is_on_seam[ends[0]] & is_on_seam[ends[1]] & (mesh.twin < np.arange(len(mesh.twin)))
+    )
+    a, b = target[ends[0][h]].astype(np.int64), target[ends[1][h]].astype(np.int64)
+    keys = np.minimum(a, b) * len(mesh.X) + np.maximum(a, b)
+    _, place, count = np.unique(keys, return_inverse=True, return_counts=True)
+    doubled = (count[place] > 1) & (mesh.twin[h] != NONE)
+    if not doubled.any():
+        return mesh
+    return split_edges(mesh, make_blocks(mesh), h[doubled].astype(np.int32), False)

@@ -1,0 +1,335 @@
+"""Curves of the reference: names, siblings, who follows whom, and the closest point of one's own stretch."""
+
+from collections import defaultdict
+
+import naive
+import nonmanifold
+import numpy as np
+import pytest
+import zoo
+from structure import built, cut_open, featured, next_of
+
+from remeshvec._jit import kernel
+from remeshvec._types import FIXED, NONE, SEAM
+from remeshvec.curves import count_at_vertices, link_chains
+from remeshvec.polyline import closest_on_curve, find_siblings, join_edges, name_edges
+
+CREASED = ["cube", "l_prism", "genus_2", "closed_cylinder", "cylinder", "annulus", "grid", "triangle"]
+CUT = ["half_discs", "book", "wall_inside", "two_planes", "three_planes", "four_cubes"]
+
+
+def features_of(name):
+    """Mesh with all its curves marked, and which half-edges these are."""
+    if name in zoo.ZOO:
+        mesh = built(*zoo.ZOO[name].make())
+        featured(mesh, feature_angle=40.0)
+    else:
+        mesh, source = cut_open(*nonmanifold.COMPLEXES[name].make())
+        featured(mesh, vertex_source=source, feature_angle=40.0)
+    return mesh, mesh.curve != NONE
+
+
+def ends(mesh, h):
+    """Vertices that a half-edge joins."""
+    return int(mesh.origin[h]), int(mesh.origin[next_of(int(h))])
+
+
+def place(mesh, h):
+    """Where an edge lies, whichever way it runs."""
+    return frozenset(tuple((mesh.X[v, :3] + 0.0).tolist()) for v in ends(mesh, h))
+
+
+def siblings_of(mesh):
+    return find_siblings(mesh.X, mesh.origin, np.flatnonzero(mesh.twin == NONE).astype(np.int32))
+
+
+# --- links ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["triangle", "annulus", "planar_delaunay", "sliver_fan"])
+def test_links_are_loops_both_ways(name):
+    mesh = built(*zoo.ZOO[name].make())
+    open_ones = np.flatnonzero(mesh.twin == NONE)
+    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, mesh.twin == NONE)
+    assert links.shape == (2, mesh.origin.size)
+    assert (links[:, mesh.twin != NONE] == NONE).all()
+    assert np.array_equal(links[1, links[0, open_ones]], open_ones)
+    end = mesh.origin[[next_of(h) for h in open_ones.tolist()]]
+    assert np.array_equal(mesh.origin[links[0, open_ones]], end)
+
+
+def test_closed_meshes_without_creases_have_no_links():
+    mesh = built(*zoo.torus())
+    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, mesh.twin == NONE)
+    assert (links == NONE).all()
+
+
+@pytest.mark.parametrize("name", CREASED)
+def test_links_join_where_two_edges_meet(name):
+    """Every edge, in both directions: what comes next is the only other edge there, or nothing."""
+    mesh, is_feature = features_of(name)
+    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, is_feature)
+    edges = {frozenset(ends(mesh, h)) for h in np.flatnonzero(is_feature)}
+    at = defaultdict(set)
+    for edge in edges:
+        for v in edge:
+            at[v].add(edge)
+    count = count_at_vertices(mesh.origin, mesh.twin, is_feature, len(mesh.X))
+    assert count.tolist() == [len(at[v]) for v in range(len(mesh.X))]
+    for h in np.flatnonzero(is_feature):
+        a, b = ends(mesh, h)
+        others = at[b] - {frozenset((a, b))}
+        after = links[0, h]
+        assert (after != NONE) == (len(others) == 1)
+        if after != NONE:
+            assert frozenset(ends(mesh, after)) in others and mesh.origin[after] == b
+            assert links[1, after] == h
+    assert (links[:, ~is_feature] == NONE).all()
+
+
+# --- siblings and names --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", CUT)
+def test_siblings_lie_in_the_same_place(name):
+    mesh, _ = features_of(name)
+    candidates = np.flatnonzero(mesh.twin == NONE).astype(np.int32)
+    expected = defaultdict(list)
+    for h in candidates.tolist():
+        expected[place(mesh, h)].append(h)
+    expected = {tuple(sorted(group)) for group in expected.values() if len(group) > 1}
+    shuffled = np.random.default_rng(0).permutation(candidates)
+    for given in (candidates, shuffled):
+        members, group = find_siblings(mesh.X, mesh.origin, given)
+        assert members.dtype == group.dtype == np.int32
+        found = [tuple(members[i:j].tolist()) for i, j in zip(group[:-1], group[1:], strict=True)]
+        assert len(found) == len(set(found)) and set(found) == expected
+        assert group[0] == 0 and group[-1] == len(members)
+
+
+def test_no_siblings():
+    none = np.empty(0, np.int32)
+    for mesh in (built(*zoo.torus()), built(*zoo.grid())):
+        members, group = siblings_of(mesh)
+        assert members.size == 0 and group.tolist() == [0]
+    members, group = find_siblings(mesh.X, mesh.origin, none)
+    assert members.size == 0 and group.tolist() == [0]
+
+
+def test_siblings_do_not_mind_the_sign_of_zero_nor_the_target_length():
+    V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, 0, 0], [1, -0.0, -0.0], [0, -1, 0.0]])
+    mesh = built(V, [[0, 1, 2], [4, 3, 5]])
+    mesh.X[:, 3] = np.arange(1, 7)
+    members, group = siblings_of(mesh)
+    assert members.tolist() == [0, 3] and group.tolist() == [0, 2]
+    mesh.X[4, 0] += 1e-16
+    assert siblings_of(mesh)[0].tolist() == [0, 3]  # 1 + 1e-16 is 1
+    mesh.X[4, 0] = np.nextafter(1, 2)
+    assert siblings_of(mesh)[0].size == 0
+
+
+def test_edges_of_no_length_are_siblings_of_each_other_only():
+    """Three faces that repeat a place: nothing else is as long as no edge at all."""
+    V = np.repeat(np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3.0]]), 3, axis=0)
+    mesh = built(V, [[0, 1, 3], [2, 6, 7], [8, 9, 10]])
+    members, group = siblings_of(mesh)
+    found = [members[i:j].tolist() for i, j in zip(group[:-1], group[1:], strict=True)]
+    assert sorted(found) == [[1, 2], [3, 5], [6, 8]]
+
+
+@pytest.mark.parametrize("name", CREASED + CUT)
+def test_an_edge_has_one_name_on_all_its_sides(name):
+    mesh, is_feature = features_of(name)
+    found = name_edges(mesh.twin, is_feature, *siblings_of(mesh))
+    assert found.dtype == np.int32 and (found[~is_feature] == NONE).all()
+    sides = defaultdict(list)
+    for h in np.flatnonzero(is_feature).tolist():
+        sides[place(mesh, h)].append(h)
+    for half_edges in sides.values():
+        assert found[half_edges].tolist() == [min(half_edges)] * len(half_edges)
+    # What the marks in the mesh say, but for those that stay.
+    moving = mesh.curve >= 0
+    assert np.array_equal(mesh.curve[moving] & (SEAM - 1), found[moving])
+    assert (mesh.curve >= SEAM).sum() == len(siblings_of(mesh)[0])
+
+
+# --- who follows whom ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "cornered"), [(name, c) for name in CREASED for c in (False, True)] + [(name, True) for name in CUT]
+)
+def test_neighbours_share_an_end_that_is_no_corner(name, cornered):
+    mesh, is_feature = features_of(name)
+    names = name_edges(mesh.twin, is_feature, *siblings_of(mesh))
+    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, is_feature)
+    corner = (mesh.kind == FIXED) & cornered
+    beside = join_edges(names, links, mesh.origin, corner)
+    assert beside.shape == (2, mesh.origin.size) and beside.dtype == np.int32
+    edges = np.unique(names[is_feature])
+    assert (np.delete(beside, edges, axis=1) == NONE).all()
+    at = defaultdict(set)  # on the sheet of the name: names at every vertex
+    for h in np.flatnonzero(is_feature).tolist():
+        for v in ends(mesh, h):
+            at[v].add(int(names[h]))
+    for h in edges.tolist():
+        for side, v in enumerate(ends(mesh, h)):
+            others = at[v] - {h}
+            goes_on = len(others) == 1 and not corner[v]
+            assert beside[side, h] == (others.pop() if goes_on else NONE)
+
+
+def test_without_curves_nobody_has_neighbours():
+    mesh = built(*zoo.torus())
+    none = np.zeros(mesh.origin.size, bool)
+    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, none)
+    names = name_edges(mesh.twin, none, *siblings_of(mesh))
+    assert (names == NONE).all()
+    assert join_edges(names, links, mesh.origin, np.zeros(len(mesh.X), bool)).shape == (2, 0)
+
+
+# --- closest point -------------------------------------------------------------------------------
+
+
+@kernel
+def query(X, origin, beside, start, P, found, parameter, squared):
+    for i in range(len(P)):
+        h, s, d = closest_on_curve(X, origin, beside, start[i], P[i, 0], P[i, 1], P[i, 2])
+        found[i], parameter[i], squared[i] = h, s, d
+
+
+def closest(mesh, beside, start, P):
+    """Edges, points and distances."""
+    found, s, squared = np.empty(len(P), int), np.empty(len(P)), np.empty(len(P))
+    query(mesh.X, mesh.origin, beside, np.asarray(start, np.int64), P, found, s, squared)
+    assert s.min() >= 0 and s.max() <= 1
+    a = mesh.X[mesh.origin[found], :3]
+    b = mesh.X[mesh.origin[[next_of(h) for h in found.tolist()]], :3]
+    points = a + s[:, None] * (b - a)
+    assert np.linalg.norm(points - P, axis=1) == pytest.approx(np.sqrt(squared), abs=1e-15)
+    return found, points, np.sqrt(squared)
+
+
+def curves(V, F, length=1.0, **wanted):
+    """Mesh, who follows whom on its curves, and the names of their edges."""
+    mesh = built(V, F)
+    reference = featured(mesh, length, **wanted).reference
+    return mesh, reference.beside, np.unique(mesh.curve[mesh.curve >= 0])
+
+
+def disc(n, radius=1.0):
+    V = np.column_stack([radius * np.cos(zoo.turn(n)), radius * np.sin(zoo.turn(n)), np.zeros(n)])
+    return np.vstack([V, [[0, 0, 0]]]), zoo.fan(np.arange(n), n)
+
+
+def polygon(points, spacing):
+    """Flat disc inside a polygon, its sides cut to equal edges of about a spacing."""
+    P = np.array(points, float)
+    rim = []
+    for a, b in zip(P, np.roll(P, -1, axis=0), strict=True):
+        n = max(1, round(np.linalg.norm(b - a) / spacing))
+        rim += [a + (b - a) * i / n for i in range(n)]
+    rim = np.array(rim)
+    V = np.vstack([rim, rim.mean(axis=0)])
+    return np.column_stack([V, np.zeros(len(V))]), zoo.fan(np.arange(len(rim)), len(rim))
+
+
+def distance_within_reach(mesh, names, start, p):
+    """Distance to all edges of a polyline that begin within three times the distance to the first."""
+    foot = lambda h: np.linalg.norm(p - naive.closest_on_segment(p, *mesh.X[list(ends(mesh, h)), :3]))  # noqa: E731
+    reach, best = 3 * foot(start), foot(start)
+    at = defaultdict(set)
+    for h in names.tolist():
+        for v in ends(mesh, h):
+            at[v].add(h)
+    for v in ends(mesh, start):
+        before, walked = start, 0.0
+        while mesh.kind[v] != FIXED and walked <= reach:
+            (h,) = at[v] - {before}
+            if h == start:
+                break
+            best = min(best, foot(h))
+            (v,) = set(ends(mesh, h)) - {v}
+            before, walked = h, walked + naive.edge_length(mesh.X[:, :3], ends(mesh, h))
+    return best
+
+
+@pytest.mark.parametrize("scale", [0.01, 0.3, 2.0])
+@pytest.mark.parametrize("name", ["annulus", "sliver_fan", "cylinder", "l_prism", "genus_2"])
+def test_the_closest_of_all_edges_within_reach(name, scale):
+    V, F = zoo.upsampled(*zoo.ZOO[name].make(), n=1, noise=0.0)
+    mesh, beside, names = curves(V, F, zoo.mean_edge(V, F), feature_angle=40.0)
+    rng = np.random.default_rng(7)
+    start = rng.choice(names, 150)
+    P = mesh.X[mesh.origin[start], :3] + scale * rng.normal(size=(150, 3))
+    _, _, distance = closest(mesh, beside, start, P)
+    expected = [distance_within_reach(mesh, names, h, p) for h, p in zip(start, P, strict=True)]
+    assert distance == pytest.approx(expected, rel=1e-12, abs=1e-14)
+
+
+def test_closest_near_the_start_is_the_closest_of_all():
+    mesh, beside, names = curves(*disc(60))
+    rng = np.random.default_rng(0)
+    turns = rng.random(200) * 2 * np.pi
+    P = np.stack([1.1 * np.cos(turns), 1.1 * np.sin(turns), 0.1 * rng.random(200)], axis=1)
+    at = mesh.X[mesh.origin[names], :3]
+    nearest = np.linalg.norm(P[:, None] - at, axis=2).argmin(axis=1)
+    start = names[(nearest + 3) % len(names)]
+    _, _, distance = closest(mesh, beside, start, P)
+    segments = mesh.X[:, :3][np.array([ends(mesh, h) for h in names])]
+    best = [min(np.linalg.norm(p - naive.closest_on_segment(p, *s)) for s in segments) for p in P]
+    assert distance == pytest.approx(best, rel=1e-12)
+
+
+def test_a_vertex_stays_on_its_own_stretch():
+    """A narrow slot: the other side is nearer, but far along the loop."""
+    points = [[0, 0], [4, 0], [4, 3], [2.1, 3], [2.1, 1], [1.9, 1], [1.9, 3], [0, 3]]
+    mesh, _, names = curves(*polygon(points, 0.1), 0.2)
+    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, mesh.twin == NONE)
+    beside = join_edges(mesh.curve, links, mesh.origin, np.zeros(len(mesh.X), bool))
+    at = mesh.X[mesh.origin[names], :2]
+    start = names[np.abs(at - [2.1, 2.5]).sum(axis=1).argmin()]
+    P = np.array([[1.97, 2.5, 0.0]])  # past the middle: 0.07 to the other side, 0.13 to its own
+    _, points, distance = closest(mesh, beside, [start], P)
+    assert points[0] == pytest.approx([2.1, 2.5, 0]) and distance[0] == pytest.approx(0.13)
+
+
+def test_no_search_goes_past_a_corner():
+    """Around the corner it would be closer; there lies another curve."""
+    mesh, beside, names = curves(*polygon([[0, 0], [3, 0], [3, 2], [0, 2]], 0.1), 0.3)
+    middle = np.array([mesh.X[list(ends(mesh, h)), :2].mean(axis=0) for h in names])
+    start = names[np.abs(middle - [2.85, 0.0]).sum(axis=1).argmin()]
+    P = np.array([[3.0, 0.5, 0.0]])
+    _, points, distance = closest(mesh, beside, [start], P)
+    assert points[0] == pytest.approx([3, 0, 0]) and distance[0] == pytest.approx(0.5)
+
+
+def test_points_on_the_curve_are_found_exactly():
+    mesh, beside, names = curves(*zoo.annulus())
+    P = mesh.X[mesh.origin[names], :3].copy()
+    _, points, distance = closest(mesh, beside, names, P)
+    assert np.array_equal(points, P) and not distance.any()
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_the_smallest_loops_end(n):
+    """Around a loop of few edges, whose neighbours on both sides are the same."""
+    t = zoo.turn(max(n, 2))
+    V = np.vstack([np.column_stack([np.cos(t), np.sin(t), 0 * t]), [[0, 0, 1], [0, 0, -1]]])
+    mesh = built(V, [[0, 1, len(t)], [1, 0, len(t) + 1]] if n < 3 else [[0, 1, 2]])
+    edges = np.flatnonzero(np.isin(mesh.origin, range(n)))[:n] if n < 3 else np.arange(3)
+    beside = np.full((2, mesh.origin.size), NONE, np.int32)
+    beside[0, edges], beside[1, edges] = np.roll(edges, 1), np.roll(edges, -1)
+    P = np.random.default_rng(0).normal(scale=10, size=(20, 3))
+    for start in edges:
+        found, _, distance = closest(mesh, beside, np.full(20, start), P)
+        assert np.isin(found, edges).all() and np.isfinite(distance).all()
+
+
+def test_without_curves_the_edge_itself_is_searched():
+    mesh = built(*zoo.tetrahedron())
+    P = np.random.default_rng(0).normal(size=(10, 3))
+    found, points, _ = closest(mesh, np.empty((2, 0), np.int32), np.full(10, 4), P)
+    assert (found == 4).all()
+    expected = [naive.closest_on_segment(p, *mesh.X[list(ends(mesh, 4)), :3]) for p in P]
+    assert points == pytest.approx(np.array(expected))
