@@ -11,12 +11,7 @@ from ._types import NONE
 from .geometry import distance_squared, face_vector
 from .halfedge import following, previous
 
-__all__ = ["ECHO", "SILENCE", "echo_beside", "face_cosine"]
-
-# What a walk can find.
-SILENCE = 0  # nothing, or a turn the other way
-ECHO = 1
-UNHEARD = 2  # it could not go far enough to tell
+__all__ = ["echoes_beside", "face_cosine"]
 
 # An echo turns by at least this share of our edge: with 0.5 and more, half as much again is kept
 # on organic shapes, and the two facets of a coarse fillet would be creases. An edge that turns by
@@ -119,40 +114,55 @@ def _exit(x, y, length, at, u, w):
 
 
 @inlined
-def echo_beside(X, origin, twin, normals, is_hard, h, reach):
-    """Walk from the middle of ``h`` straight into its face and tell whether the same turn comes again.
+def echoes_beside(X, origin, twin, normals, is_hard, h, reach):
+    """Count how often the turn across ``h`` comes again, straight into its face.
 
-    The walk runs over unfolded faces, perpendicular to the edge, for a length of ``reach``. The
-    first edge that is nearly parallel and turns by a comparable angle decides: an ``ECHO`` has the
-    same sign.
+    The walk runs over unfolded faces from the middle of the edge, perpendicular to it, for a length
+    of ``reach``. The first edge that is nearly parallel and turns by a comparable angle decides: it
+    is an echo if it turns to the same side. From there the walk goes on for a second one.
+
+    Returns
+    -------
+    echoes : int
+        0, 1 or 2.
+    is_cut_short : bool
+        Whether the walk ended where the face does, so that there might be more of them.
     """
     turn = acos(min(1.0, max(-1.0, face_cosine(normals, h // 3, twin[h] // 3))))
     quiet = cos(SHARE * turn) + COSINE_TOLERANCE
     loud = cos(min(3.0, MULTIPLE * turn)) + COSINE_TOLERANCE
     convex = _is_convex(X, origin, normals, h, twin[h])
     x0, y0, z0 = _direction(X, origin, normals, h, 0.0, 1.0)
+    echoes = 0
+    left = reach
     g = h
     share, u, w = 0.5, 0.0, 1.0
     for _ in range(MAX_STEPS):
         x, y, length = _unfolded_apex(X, origin, g)
         is_last, distance, share, dx, dy = _exit(x, y, length, share * length, u, w)
-        reach -= distance
-        if reach < 0.0:
-            return SILENCE
+        left -= distance
+        if left < 0.0:
+            return echoes, False
         g = previous(g) if is_last else following(g)
         t = np.int64(twin[g])
         if t == NONE or is_hard[g]:
-            return UNHEARD
+            return echoes, True
         u, w = u * dx + w * dy, max(abs(u * dy - w * dx), 1e-9)
         cosine = face_cosine(normals, g // 3, t // 3)
         if cosine <= quiet and w >= PARALLEL:
             if cosine <= loud:
-                return UNHEARD
-            return ECHO if _is_convex(X, origin, normals, g, t) == convex else SILENCE
-        if cosine < STEEP:
-            return UNHEARD
+                return echoes, True
+            if _is_convex(X, origin, normals, g, t) != convex:
+                return echoes, False
+            echoes += 1
+            left = reach
+            if echoes == 2:
+                return echoes, False
+        elif cosine < STEEP:
+            return echoes, True
         g = t
-        xd, yd, zd = _direction(X, origin, normals, g, u, w)
-        if xd * x0 + yd * y0 + zd * z0 < AWAY:
-            return SILENCE
-    return SILENCE
+        if echoes == 0:
+            xd, yd, zd = _direction(X, origin, normals, g, u, w)
+            if xd * x0 + yd * y0 + zd * z0 < AWAY:
+                return echoes, False
+    return echoes, False

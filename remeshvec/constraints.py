@@ -4,19 +4,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._types import NONE, Mesh
+from ._types import NONE, IndexArray, Mesh
 from .errors import OptionError
 
-__all__ = ["BOUNDARY_MODES", "Constraints", "make_constraints"]
+__all__ = ["BOUNDARY_MODES", "Constraints", "Marks", "make_constraints"]
 
 BOUNDARY_MODES = ("free", "split", "fixed")
 
 BoolArray = NDArray[np.bool_]
+
+
+class Marks(NamedTuple):
+    """What must stay, on a mesh."""
+
+    hard: BoolArray  # (3 m,) half-edges that are features whatever their angle
+    held: BoolArray | None  # (m,) faces that stay as they are; None for none
+    frozen: BoolArray  # (3 m,) half-edges that stay as they are
+    fixed: BoolArray  # (n,) vertices that stay where they are
 
 
 @dataclass(frozen=True)
@@ -29,28 +38,61 @@ class Constraints:
     fixed_vertices: NDArray[np.int64]  # (k,)
     fixed_faces: BoolArray | None  # (m,)
     labels: NDArray[Any] | None  # (m,)
-    is_selection: bool  # fixed faces are to come first, in their order
+    unselected: BoolArray | None  # (m,) those of the fixed faces that are to come first, in order
 
-    def hard_edges(
-        self, mesh: Mesh, vertex_source: NDArray[np.int32], face_source: NDArray[np.intp]
-    ) -> BoolArray:
-        """Tell which half-edges of the mesh are features by the caller's word: (3 m,) bool."""
-        hard = np.zeros(len(mesh.origin), np.bool_)
-        if len(self.feature_edges):
-            n = int(max(vertex_source.max(), self.feature_edges.max())) + 1
-            ends = vertex_source[mesh.origin].astype(np.int64).reshape(-1, 3)
-            keys = _edge_keys(ends.ravel(), np.roll(ends, -1, axis=1).ravel(), n)
-            hard |= np.isin(keys, _edge_keys(*self.feature_edges.T, n))
+    def on_mesh(
+        self, mesh: Mesh, vertex_source: IndexArray, face_source: NDArray[np.intp], same: Any
+    ) -> Marks:
+        """Turn the wishes to masks of a mesh whose elements come from the input's.
+
+        Parameters
+        ----------
+        mesh : Mesh
+        vertex_source : (n,) int32
+        face_source : (m,) int
+        same : (n_in,) int32, optional
+            The vertex that stands for each of the input, where some were welded.
+        """
+        n = int(vertex_source.max()) + 1
+        ends = vertex_source[mesh.origin].astype(np.int64).reshape(-1, 3)
+        keys = _edge_keys(ends.ravel(), np.roll(ends, -1, axis=1).ravel(), n)
+        edges, vertices = self.feature_edges, self.fixed_vertices
+        if same is not None:
+            edges, vertices = same[edges].astype(np.int64), same[vertices]
+        hard = np.zeros(len(keys), np.bool_)
+        if len(edges):
+            hard |= np.isin(keys, _edge_keys(*edges.T, n))
         if self.labels is not None:
             hard |= _borders(mesh.twin, self.labels[face_source])
-        return hard
+        fixed = np.zeros(max(n, int(vertices.max(initial=0)) + 1), np.bool_)
+        fixed[vertices] = True
+        fixed = fixed[vertex_source]
+        held = None if self.fixed_faces is None else self.fixed_faces[face_source]
+        frozen = np.zeros(len(keys), np.bool_)
+        if held is not None and held.any():
+            frozen |= np.repeat(held, 3)
+        else:
+            held = None
+        if self.boundary != "free":
+            border = _border_edges(mesh.twin, keys)
+            fixed[mesh.origin[border]] = True
+            fixed[mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()[border]] = True
+            if self.boundary == "fixed":
+                frozen |= border
+        if frozen.any():  # all sides of an edge, of two faces or more
+            frozen = np.isin(keys, np.unique(keys[frozen]))
+            fixed[mesh.origin[frozen]] = True
+            fixed[mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()[frozen]] = True
+        return Marks(hard, held, frozen, fixed)
 
-    def held_faces(self, face_source: NDArray[np.intp]) -> BoolArray | None:
-        """Tell which faces of the mesh stay as they are; None for none."""
-        if self.fixed_faces is None:
-            return None
-        held = self.fixed_faces[face_source]
-        return held if held.any() else None
+
+def _border_edges(twin: IndexArray, keys: NDArray[np.int64]) -> BoolArray:
+    """Half-edges without a twin that have no sibling on another sheet either."""
+    h = np.flatnonzero(twin == NONE)
+    _, place, count = np.unique(keys[h], return_inverse=True, return_counts=True)
+    border = np.zeros(len(twin), np.bool_)
+    border[h[count[place] == 1]] = True
+    return border
 
 
 def _borders(twin: NDArray[np.int32], value: NDArray[Any]) -> BoolArray:
@@ -82,9 +124,10 @@ def make_constraints(
         angle or a mode that does not exist.
     """
     fixed = None if fixed_faces is None else _face_mask(fixed_faces, len(F), "fixed_faces")
+    unselected = None
     if selection is not None:
-        outside = ~_face_mask(selection, len(F), "selection")
-        fixed = outside if fixed is None else fixed | outside
+        unselected = ~_face_mask(selection, len(F), "selection")
+        fixed = unselected if fixed is None else fixed | unselected
     labels = None
     if face_labels is not None:
         labels = _array(face_labels, "face_labels")
@@ -102,7 +145,7 @@ def make_constraints(
         else _indices(fixed_vertices, n, "fixed_vertices", "vertex"),
         fixed,
         labels,
-        selection is not None,
+        unselected,
     )
 
 

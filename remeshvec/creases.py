@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._chains import CLEAN, HARD, STRONG, SURE, WEAK, count_chains, keep_chains
-from ._echo import ECHO, SILENCE, echo_beside, face_cosine
+from ._echo import echoes_beside, face_cosine
 from ._jit import inlined, kernel
 from ._types import MAX_VALENCE, NONE, FloatArray, IndexArray
 from .geometry import angle_from_cosine, distance_squared, face_vector
@@ -35,9 +35,10 @@ SURE_RATIO = 8.0
 STEEP_RATIO = 5.0
 CLEAN_RATIO = 100.0
 
-# In target lengths: facets narrower than the first are curvature at the scale of the new mesh,
-# faces higher than the second are flat whatever is around them.
+# In target lengths: facets narrower than the first are curvature at the scale of the new mesh;
+# beside a clean edge the second. Faces higher than the third are flat whatever is around them.
 ECHO_REACH = 1.5
+CLEAN_REACH = 1.25
 FLAT_HEIGHT = 2.5
 
 # Degrees by which turns may miss a threshold.
@@ -246,13 +247,17 @@ def _rank_edges(X, origin, twin, vertex_halfedge, normals, state, is_hard, found
         if rank[k] == 0:
             in_noise += 1
         elif turn < STEEP_TURN:
-            echoes = 0
-            silences = 0
+            is_clean = turn >= CLEAN_RATIO * noise
+            reach = target * (CLEAN_REACH if is_clean else ECHO_REACH)
+            total = 0
+            open_sides = 0
             for g in (h, t):
-                heard = echo_beside(X, origin, twin, normals, is_hard, g, ECHO_REACH * target)
-                echoes += heard == ECHO
-                silences += heard == SILENCE
-            if echoes and (silences == 0 or turn < CLEAN_RATIO * noise):
+                echoes, is_cut_short = echoes_beside(X, origin, twin, normals, is_hard, g, reach)
+                total += echoes
+                open_sides += echoes == 0 and not is_cut_short
+            # In noise one echo is enough. A clean turn that comes twice makes a chamfer or a land;
+            # if it comes three times it is curvature.
+            if total >= 2 or (total == 1 and (open_sides == 0 or not is_clean)):
                 rank[k] = 0
                 echoing += 1
     return in_noise, echoing

@@ -72,11 +72,11 @@ def extract(
     kept, new = _weld(mesh, built)
     F = new[mesh.origin.reshape(-1, 3)]
     source = prepared.face_source[mesh.source]
-    order = None
     if built.held is not None:
         held = built.held[mesh.source]
-        if constraints.is_selection:
-            order = np.lexsort((np.where(held, source, 0), ~held))
+        if constraints.unselected is not None:
+            first = constraints.unselected[source] & held
+            order = np.lexsort((np.where(first, source, 0), ~first))
             F, source, held = F[order], source[order], held[order]
     face_map = np.full(n_faces, -1, np.int64)
     if built.held is not None:

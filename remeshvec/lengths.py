@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ._jit import kernel
 from ._types import FloatArray
+from .constraints import Marks
 from .creases import find_creases
 from .errors import MeshInputError, OptionError
 from .geometry import distance_squared, face_vector
@@ -69,10 +70,11 @@ def set_lengths(
     measures: Measures,
     V: FloatArray,
     L: Any,
-    hard: NDArray[np.bool_],
+    marks: Marks,
     feature_angle: float | str | None,
     gradation: float,
     max_faces: int,
+    max_deviation: float | None = None,
 ) -> float:
     """Write target lengths to the last column of ``X``; returns the length of the mean new face.
 
@@ -84,11 +86,14 @@ def set_lengths(
         The caller's vertices.
     L : None, number, array, callable or Adaptive
         In the units of ``V``.
-    hard : (3 m,) bool
-        Half-edges that are features whatever their angle; an adaptive length is not smoothed over them.
+    marks : Marks
+        What must stay: lengths from curvature are not smoothed over hard edges.
     feature_angle : float, "auto" or None
     gradation : float
     max_faces : int
+    max_deviation : float, optional
+        Lengths are cut to what the curvature needs to stay this near, but not below the input's own
+        edges.
 
     Raises
     ------
@@ -98,18 +103,41 @@ def set_lengths(
     """
     X = prepared.mesh.X
     if isinstance(L, Adaptive):
-        lengths = _adaptive(prepared, measures, L, hard, feature_angle)
+        lengths = _adaptive(prepared, measures, L, marks.hard, feature_angle)
     else:
         asked = target_lengths(V, L) if L is not None else 0.9 * measures.mean_edge / prepared.scale
         if not isinstance(asked, np.ndarray):
-            X[:, 3] = _in_range(asked * prepared.scale)
-            _check_output(prepared, measures, measures.area / X[0, 3] ** 2 / _FACE, max_faces)
-            return float(X[0, 3])
+            asked = np.full(len(V), asked)
         lengths = _in_range(asked[prepared.vertex_source] * prepared.scale)
+    if max_deviation is not None:
+        lengths = _near_input(prepared, measures, lengths, max_deviation, marks.hard, feature_angle)
     X[:, 3] = _limited(prepared, lengths, gradation)
     expected = expected_faces(X, prepared.mesh.origin, X[:, 3])
     _check_output(prepared, measures, expected, max_faces)
     return sqrt(measures.area / (expected * _FACE))
+
+
+def _near_input(
+    prepared: Prepared,
+    measures: Measures,
+    lengths: FloatArray,
+    distance: float,
+    hard: NDArray[np.bool_],
+    feature_angle: float | str | None,
+) -> FloatArray:
+    """Cut lengths to those whose chords stay near, and to no less than half the input's own edges."""
+    mesh = prepared.mesh
+    own = np.zeros(len(mesh.X))
+    count = np.zeros(len(mesh.X))
+    ends = mesh.origin, mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    edge = np.linalg.norm(mesh.X[ends[0], :3] - mesh.X[ends[1], :3], axis=1)
+    for end in ends:
+        own += np.bincount(end, edge, len(own))
+        count += np.bincount(end, minlength=len(own))
+    own /= np.maximum(count, 1)
+    spec = Adaptive(distance, 1e-3 * distance, max(float(lengths.max()), distance) / prepared.scale)
+    curved = _adaptive(prepared, measures, spec, hard, feature_angle)
+    return np.minimum(lengths, np.maximum(curved, 0.5 * own))
 
 
 def _in_range(lengths: Any) -> Any:
@@ -137,6 +165,8 @@ def _adaptive(
 def _limited(prepared: Prepared, lengths: FloatArray, gradation: float) -> FloatArray:
     """Bound the growth of lengths, also from sheet to sheet where they meet."""
     mesh, source = prepared.mesh, prepared.vertex_source
+    if lengths.max() == lengths.min():
+        return lengths
     copies = len(source) > len(np.unique(source))
     arrays = (mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge)
     for _ in range(16):

@@ -9,12 +9,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jit import inlined
+from ._jit import inlined, kernel
 from ._types import NONE, FloatArray, IndexArray
-from .geometry import closest_on_segment
+from .geometry import closest_on_segment, distance_squared
 from .halfedge import following
 
-__all__ = ["closest_on_curve", "find_siblings", "join_edges", "name_edges"]
+__all__ = [
+    "closest_on_curve",
+    "find_siblings",
+    "join_edges",
+    "measure_arcs",
+    "move_on_curve",
+    "name_edges",
+]
 
 
 def name_edges(
@@ -73,6 +80,62 @@ def join_edges(
         is_open = (neighbour == NONE) | is_corner[ends[side]]
         beside[side, edges] = np.where(is_open, NONE, name[neighbour])
     return beside
+
+
+def measure_arcs(
+    X: FloatArray, origin: IndexArray, name: IndexArray, beside: IndexArray
+) -> FloatArray:
+    """Measure how far along its curve every edge lies.
+
+    Returns
+    -------
+    arcs : (3, 3 m) float64
+        At the names: arc length at the start of the edge and at its end, and that of the whole curve,
+        negative for one that ends at corners; (3, 0) where there are no curves.
+    """
+    arcs = np.zeros((3, beside.shape[1]))
+    if beside.shape[1]:
+        edges = np.unique(name[name != NONE])
+        is_end = (beside[:, edges] == NONE).any(axis=0)
+        # Curves with ends first, from one of them; what is left is closed.
+        seeds = np.concatenate([edges[is_end], edges[~is_end]])
+        _measure_arcs(X, origin, beside, seeds, arcs)
+    return arcs
+
+
+@kernel
+def _measure_arcs(X, origin, beside, seeds, arcs):
+    path = np.empty(seeds.size, np.int64)
+    for seed in seeds:
+        if arcs[2, seed] != 0.0:
+            continue
+        is_open = beside[0, seed] == NONE or beside[1, seed] == NONE
+        # The end of the edge by which the walk comes in.
+        end = 0 if beside[0, seed] == NONE or not is_open else 1
+        h = np.int64(seed)
+        total = 0.0
+        count = 0
+        while count < path.size:
+            path[count] = h
+            count += 1
+            a = origin[h]
+            b = origin[following(h)]
+            arcs[end, h] = total
+            total += np.sqrt(distance_squared(X, a, b))
+            arcs[1 - end, h] = total
+            after = np.int64(beside[1 - end, h])
+            if after == NONE or after == seed:
+                break
+            end = 0 if _shares(X, origin[after], b if end == 0 else a) else 1
+            h = after
+        for i in range(count):
+            arcs[2, path[i]] = -total if is_open else total
+
+
+@inlined
+def _shares(X, v, w):
+    """Tell whether two vertices lie in the same place: sheets have copies of their own."""
+    return X[v, 0] == X[w, 0] and X[v, 1] == X[w, 1] and X[v, 2] == X[w, 2]
 
 
 def find_siblings(
@@ -142,3 +205,33 @@ def closest_on_curve(X, origin, beside, start, x, y, z):
                 after = np.int64(beside[1, h])
             before, h = h, after
     return best, s, distance
+
+
+@inlined
+def move_on_curve(X, origin, beside, arcs, edge, arc):
+    """Go along a curve from an edge to an arc length; returns the edge and the parameter there."""
+    h = np.int64(edge)
+    total = arcs[2, h]
+    if total < 0.0:
+        arc = min(max(arc, 0.0), -total)
+    elif arc < 0.0:
+        arc += total
+    elif arc > total:
+        arc -= total
+    for _ in range(beside.shape[1]):
+        low = min(arcs[0, h], arcs[1, h])
+        high = max(arcs[0, h], arcs[1, h])
+        if low <= arc <= high:
+            break
+        # Towards the arc; on a closed curve the shorter way around.
+        ahead = arc > high
+        if total > 0.0 and abs(arc - 0.5 * (low + high)) > 0.5 * total:
+            ahead = not ahead
+        end = 1 if (arcs[1, h] > arcs[0, h]) == ahead else 0
+        after = np.int64(beside[end, h])
+        if after == NONE:
+            break
+        h = after
+    length = arcs[1, h] - arcs[0, h]
+    s = (arc - arcs[0, h]) / length if length != 0.0 else 0.0
+    return h, min(max(s, 0.0), 1.0)

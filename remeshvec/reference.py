@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._jit import kernel
-from ._types import HELD, CURVE, FIXED, FROZEN, INNER, NONE, SEAM, FloatArray, IndexArray, Mesh
+from ._types import HELD, CURVE, FIXED, FROZEN, INNER, NONE, SEAM, IndexArray, Mesh
 from .bvh import build_tree
-from .constraints import Constraints
+from .constraints import Marks
 from .corners import find_corners
 from .creases import find_creases
 from .curves import link_chains
 from .features import apexes
 from .operations.project import Reference
-from .polyline import find_siblings, join_edges, name_edges
+from .polyline import find_siblings, join_edges, measure_arcs, name_edges
 
 __all__ = ["Built", "build_reference"]
 
@@ -44,10 +44,8 @@ class Built(NamedTuple):
 def build_reference(
     mesh: Mesh,
     vertex_source: IndexArray,
-    constraints: Constraints,
-    hard: BoolArray,
-    held: BoolArray | None,
-    fixed: BoolArray,
+    feature_angle: float | str | None,
+    marks: Marks,
     parallel: bool,
 ) -> Built:
     """Find the features of a mesh before its first sweep, mark them in it, and build the reference.
@@ -58,58 +56,39 @@ def build_reference(
         Target lengths in the last column of ``X``; ``kind``, ``curve`` and ``birth`` are set.
     vertex_source : (n,) int32
         Equal for vertices that were one before the surface was cut.
-    constraints : Constraints
-    hard : (3 m,) bool
-        Half-edges that are features whatever their angle.
-    held : (m,) bool, optional
-        Faces that stay as they are.
-    fixed : (n,) bool
-        Vertices that stay where they are.
+    feature_angle : float, "auto" or None
+    marks : Marks
+        What the caller wants to stay.
     parallel : bool
     """
     origin, twin = mesh.origin.copy(), mesh.twin.copy()
-    is_open = twin == NONE
-    open_edges = np.flatnonzero(is_open).astype(np.int32)
-    members, group = find_siblings(mesh.X, origin, open_edges)
+    members, group = find_siblings(mesh.X, origin, np.flatnonzero(twin == NONE).astype(np.int32))
     arrays = (mesh.X, origin, twin, mesh.vertex_halfedge)
-    is_feature, counts = find_creases(*arrays, hard, constraints.feature_angle)
+    is_feature, counts = find_creases(*arrays, marks.hard, feature_angle)
     links = link_chains(origin, twin, mesh.vertex_halfedge, is_feature)
     name = name_edges(twin, is_feature, members, group)
-    fixed = fixed | find_corners(*arrays, is_feature, links, constraints.feature_angle)
-    counts["corners"] = 0
-    is_frozen = np.zeros(len(origin), np.bool_)
-    if held is not None:
-        is_frozen |= np.repeat(held, 3)
-        is_frozen[twin[is_frozen & ~is_open]] = True
-    if constraints.boundary != "free":
-        border = is_open.copy()
-        border[members] = False
-        fixed[_ends(origin, border)] = True
-        if constraints.boundary == "fixed":
-            is_frozen |= border
+    fixed = marks.fixed | find_corners(*arrays, is_feature, links, feature_angle)
     on_seam = None
     if len(members):
         on_seam = np.zeros(len(mesh.X), np.bool_)
         on_seam[_ends(origin, members)] = True
-        frozen_group = np.repeat(np.logical_or.reduceat(is_frozen[members], group[:-1]), np.diff(group))
-        is_frozen[members] |= frozen_group
         fixed |= _junctions(origin, name, vertex_source, on_seam)
-    fixed[_ends(origin, is_frozen)] = True
-    if on_seam is not None:
         fixed = _agree(fixed, vertex_source, on_seam)
-    _lengthen_beside(mesh.X, origin, is_frozen)
 
     counts["corners"] = int((fixed & _touched(origin, is_feature, len(fixed))).sum())
     beside = join_edges(name, links, origin, fixed)
-    _mark(mesh, origin, is_feature, is_frozen, name, members, fixed)
+    _mark(mesh, origin, is_feature, marks.frozen, name, members, fixed)
     mesh.kind[apexes(mesh)] = HELD
-    is_wall = is_feature | is_frozen if held is None else is_feature | _walls(twin, held)
+    is_wall = is_feature if marks.held is None else is_feature | _walls(twin, marks.held)
     inside = np.where(is_wall, NONE, twin).astype(np.int32)
     patch = np.full(len(origin) // 3, NONE, np.int32)
     _fill_patches(inside, patch)
     tree = build_tree(mesh.X, origin.reshape(-1, 3), inside, patch, parallel)
-    reference = Reference(tree, mesh.X.copy(), origin, beside)
-    return Built(reference, on_seam, held, _edge_keys(origin, is_feature, len(fixed)), counts)
+    arcs = measure_arcs(mesh.X, origin, name, beside)
+    reference = Reference(tree, mesh.X.copy(), origin, beside, arcs)
+    _lengthen_beside(mesh, marks.frozen)
+    keys = _edge_keys(origin, is_feature, len(fixed))
+    return Built(reference, on_seam, marks.held, keys, counts)
 
 
 def _ends(origin: IndexArray, which: NDArray[np.generic]) -> IndexArray:
@@ -123,17 +102,18 @@ def _edge_keys(origin: IndexArray, which: BoolArray, n: int) -> NDArray[np.int64
     return ends[0] * n + ends[1]
 
 
-def _lengthen_beside(X: FloatArray, origin: IndexArray, is_frozen: BoolArray) -> None:
+def _lengthen_beside(mesh: Mesh, frozen: BoolArray) -> None:
     """Let the target length at the ends of an edge that must not be split reach that of the edge.
 
     The other edges of its faces cannot all be shorter than half of it: they would be split for ever.
+    In the mesh only: elsewhere the reference says what was asked for.
     """
-    h = np.flatnonzero(is_frozen)
+    h = np.flatnonzero(frozen)
     if len(h):
-        a, b = _ends(origin, h).reshape(2, -1)
-        length = np.linalg.norm(X[a, :3] - X[b, :3], axis=1)
-        np.maximum.at(X[:, 3], a, length)
-        np.maximum.at(X[:, 3], b, length)
+        a, b = _ends(mesh.origin, h).reshape(2, -1)
+        length = np.linalg.norm(mesh.X[a, :3] - mesh.X[b, :3], axis=1)
+        np.maximum.at(mesh.X[:, 3], a, length)
+        np.maximum.at(mesh.X[:, 3], b, length)
 
 
 def _touched(origin: IndexArray, is_feature: BoolArray, n: int) -> BoolArray:

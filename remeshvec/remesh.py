@@ -258,38 +258,28 @@ class _Job:
         """Remesh a copy of the mesh."""
         prepared = self.prepared._replace(mesh=self.prepared.copy_mesh())
         mesh, watch = prepared.mesh, self.sweeps.watch
-        constraints, sizing = self.constraints, self.sizing
+        sizing = self.sizing
         with watch.time("reference"):
-            hard = constraints.hard_edges(mesh, prepared.vertex_source, prepared.face_source)
+            marks = self.constraints.on_mesh(
+                mesh, prepared.vertex_source, prepared.face_source, prepared.same
+            )
+            angle = self.constraints.feature_angle
             length = set_lengths(
                 prepared,
                 self.measures,
                 self.V,
                 sizing.L if L is None else L,
-                hard,
-                constraints.feature_angle,
+                marks,
+                angle,
                 sizing.gradation,
                 sizing.max_faces,
+                self.sweeps.options.max_deviation,
             )
-            built = build_reference(
-                mesh,
-                prepared.vertex_source,
-                constraints,
-                hard,
-                constraints.held_faces(prepared.face_source),
-                self._fixed(),
-                self.sweeps.is_parallel(len(mesh.origin) // 3),
-            )
+            parallel = self.sweeps.is_parallel(len(mesh.origin) // 3)
+            built = build_reference(mesh, prepared.vertex_source, angle, marks, parallel)
         mesh = self.sweeps.run(mesh, built)
         mesh, barycentric = self.sweeps.finish(mesh, built)
         return _Done(mesh, barycentric, built, length / prepared.scale)
-
-    def _fixed(self) -> NDArray[np.bool_]:
-        """Vertices of the mesh that the caller wants to stay."""
-        is_fixed = np.zeros(len(self.V), np.bool_)
-        vertices = self.constraints.fixed_vertices
-        is_fixed[vertices if self.prepared.same is None else self.prepared.same[vertices]] = True
-        return is_fixed[self.prepared.vertex_source]
 
 
 def _wanted_count(L: Any, n_faces: Any, n_vertices: Any) -> tuple[str, int] | None:

@@ -27,8 +27,9 @@ from .edge_sets import make_blocks
 from .operations.collapse import CollapseLimits, collapse_short_edges, collapse_siblings
 from .operations.fit import fit_vertices
 from .operations.flip import FlipLimits, flip_edges
-from .operations.project import locate_vertices, project_curves, project_vertices, read_lengths
+from .operations.project import locate_vertices, project_vertices, read_lengths
 from .operations.relax import relax_vertices
+from .operations.slide import slide_vertices
 from .operations.split import MAX_ROUNDS, compact, split_edges, split_long_edges
 from .operations.unfold import undo_folds
 from .operations.untangle import untangle_vertices
@@ -55,6 +56,11 @@ _FIT_REACH = 0.2
 _ATTEMPTS = 8
 
 
+# So many sweeps that split and collapse about as many edges, and below this share of all, go in circles.
+_CYCLE = 4
+_CALM = 0.05
+
+
 class Sweeps:
     """The sweeps of one call: options in, counts and seconds out."""
 
@@ -68,6 +74,7 @@ class Sweeps:
         self.scale = 1.0  # of the frame that meshes come in
         self.guard: DeviationGuard | None = None
         self.deviation: dict[str, float] = {}
+        self.is_calm = False
         self.counts: list[dict[str, int]] = []
         self.stop = "all sweeps done"
 
@@ -80,10 +87,12 @@ class Sweeps:
         blocks = make_blocks(mesh)
         varies = bool(np.ptp(mesh.X[:, 3]) > 0.0)
         self.counts = []
+        self.is_calm = False
         self.guard = self._make_guard(mesh, built)
         for sweep in range(self.options.iterations):
+            factor = self._split_factor(mesh, sweep)
             self.counts.append({})
-            mesh, blocks = self._split(mesh, blocks, built, self.options.split[sweep])
+            mesh, blocks = self._split(mesh, blocks, built, factor)
             if self._is_cancelled(sweep, "split"):
                 break
             if self.guard is not None:
@@ -95,6 +104,19 @@ class Sweeps:
             if self.stop == "cancelled" or self._has_converged(mesh, step):
                 break
         return mesh
+
+    def _split_factor(self, mesh: Mesh, sweep: int) -> float:
+        """Factor above which edges are split, from now on.
+
+        Once all that is left is edges that are split and collapsed again and again, because their
+        place has room for neither one nor two, those stay whose halves would soon be collapsed.
+        """
+        edges = 1.5 * np.count_nonzero(mesh.origin[::3] != DEAD)
+        done = [counts["split"] + counts["collapse"] for counts in self.counts[-_CYCLE:]]
+        if len(done) == _CYCLE and done[-1] < _CALM * edges and min(done) > 0.7 * max(done):
+            self.is_calm = True
+        factor = self.options.split[sweep]
+        return max(factor, 2.5 * self.options.collapse[sweep]) if self.is_calm else factor
 
     def _make_guard(self, mesh: Mesh, built: Built) -> DeviationGuard | None:
         if self.options.max_deviation is None:
@@ -196,13 +218,12 @@ class Sweeps:
         before = mesh.X.copy() if built.has_curves else None
         with self.watch.time("relax"):
             for _ in range(options.last_relaxations if left == 1 else 1):
+                slide_vertices(mesh, blocks, built.reference, parallel)
                 relax_vertices(mesh, blocks, options.stiffness, parallel)
         with self.watch.time("project"):
             must = self.guard is not None or options.tol is not None
             if options.project and (must or left <= options.projected_sweeps):
                 project_vertices(mesh, blocks, built.reference, _TRUST, parallel)
-            else:
-                project_curves(mesh, blocks, built.reference, parallel)
             if before is not None:
                 undo_folds(mesh, blocks, before, parallel)
             if varies:

@@ -183,48 +183,20 @@ def voronoi_areas(V, F) -> np.ndarray:
     return areas
 
 
-def relaxed(V, F, *, stiffness=0.0, lengths=None, curves=(), fixed=()) -> np.ndarray:
-    """Every vertex moved at once: ``p += (I - n n^T)(g - p)``, those on curves along them.
+def relaxed(V, F, *, stiffness=0.0, lengths=None, still=()) -> np.ndarray:
+    """Every inner vertex moved at once: ``p += (I - n n^T)(g - p)``.
 
-    Boundary edges are curves. Steps beside a curve or a fixed vertex are cut until no face turns over.
+    Vertices of the boundary stay, and their weights count twice; so do those of curves, but once.
     """
     lengths = np.ones(len(V)) if lengths is None else lengths
     ring, weights = neighbours(F), voronoi_areas(V, F) / lengths**2
-    curves = boundary_edges(F) | set(curves)
-    stiff = {v for edge in curves for v in edge} | set(fixed)
+    rim = {v for edge in boundary_edges(F) for v in edge}
+    weights[sorted(rim)] *= 2
     result = V.copy()
-    for v, around in ring.items():
-        if v in fixed:
-            continue
-        beside = [w for w in around if frozenset((v, w)) in curves]
-        if beside:
-            result[v] += along_chord(V, lengths, v, *beside)
-            continue
-        g = sum(weights[w] * V[w] for w in around) / sum(weights[w] for w in around)
-        step = tangential(V, F, v, g - V[v], stiffness)
-        if around & stiff:
-            shares = (1.0, 0.5, 0.25)
-            step = next((s * step for s in shares if not turns(V, F, v, s * step)), 0.0)
-        result[v] += step
+    for v in set(ring) - rim - set(still):
+        g = sum(weights[w] * V[w] for w in ring[v]) / sum(weights[w] for w in ring[v])
+        result[v] += tangential(V, F, v, g - V[v], stiffness)
     return result
-
-
-def along_chord(V, lengths, v: int, u: int, w: int) -> np.ndarray:
-    """Step along the line of the neighbours to where both edges have their share of its length."""
-    to_u, to_w = lengths[u] + lengths[v], lengths[w] + lengths[v]
-    aim = V[u] + to_u / (to_u + to_w) * (V[w] - V[u])
-    chord = (V[w] - V[u]) / np.linalg.norm(V[w] - V[u])
-    return (aim - V[v]) @ chord * chord
-
-
-def turns(V, F, v: int, step, degrees: float = 60.0) -> bool:
-    """Whether a step of one vertex turns a face around it by more than an angle."""
-    W = V.copy()
-    W[v] += step
-    around = [f for f in tuples(F) if v in f]
-    return any(
-        np.degrees(angle(np.zeros(3), normal(V, f), normal(W, f))) > degrees for f in around
-    )
 
 
 def tangential(V, F, v: int, step, stiffness: float) -> np.ndarray:

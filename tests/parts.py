@@ -23,7 +23,7 @@ def rounded(segments: int, radius: float = 0.4) -> np.ndarray:
     corners = []
     for k, (x, y) in enumerate([(1.5, 1), (-1.5, 1), (-1.5, -1), (1.5, -1)]):
         turned = arc @ np.linalg.matrix_power(np.array([[0, 1], [-1, 0]]), k)
-        corners.append(turned + [x - np.sign(x) * radius, y - np.sign(y) * radius])
+        corners.append(turned + np.array([x - np.sign(x) * radius, y - np.sign(y) * radius]))
     return np.vstack(corners)
 
 
@@ -46,21 +46,20 @@ def plate(n: int = 32, height: float = 0.5, m: int = 2) -> Arrays:
     """Square plate of side 4 with a round hole of radius 1; n a multiple of 8."""
     c = np.stack([np.cos(zoo.turn(n)), np.sin(zoo.turn(n))], axis=1)
     square = 2 * c / np.abs(c).max(axis=1, keepdims=True)
-    profile = []
-    for k in range(m):
-        s = k / m
-        profile += [(s, 0.0, k), (1.0, s, m + k), (1 - s, 1.0, 2 * m + k), (0.0, 1 - s, 3 * m + k)]
-    profile.sort(key=lambda point: point[2])
+    # Share of the way from the circle to the square, and of the height: bottom, rim, top, hole.
+    profile = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], float)
+    steps = np.arange(4 * m) / m
+    out, up = (np.interp(steps, np.arange(5), column) for column in profile.T)
     rings = [np.column_stack([c + out * (square - c), np.full(n, up * height)])
-             for out, up, _ in profile]  # fmt: skip
+             for out, up in zip(out, up, strict=True)]  # fmt: skip
     V = np.stack(rings, axis=1).reshape(-1, 3)
     return zoo.outward(V, zoo.wrapped_grid(n, 4 * m, True, True))
 
 
 def hemisphere(n: int = 24, m: int = 6) -> Arrays:
     """Half of the unit sphere, closed by a disc."""
-    rings = [(1.0 - 0.5 * k, 0.0) for k in (1,)]
-    rings += [(np.cos(t), np.sin(t)) for t in np.linspace(0, np.pi / 2, m + 1)[:-1]]
+    latitudes = np.linspace(0, np.pi / 2, m + 1)[:-1]
+    rings = [(0.5, 0.0), *zip(np.cos(latitudes), np.sin(latitudes), strict=True)]
     t = zoo.turn(n)
     V = [np.stack([r * np.cos(t), r * np.sin(t), np.full(n, z)], axis=1) for r, z in rings]
     F, i, j = [], np.arange(n), np.roll(np.arange(n), -1)
@@ -100,8 +99,8 @@ def creases_of(V: np.ndarray, F: np.ndarray, above: float = 40.0) -> set[tuple[i
 def roughened(V: np.ndarray, F: np.ndarray, noise: float, times: int = 2, seed: int = 0):
     """Cut faces into 4^times irregular ones and add noise; returns V, F and the creases.
 
-    Vertices off the creases move by up to a quarter of an edge inside their faces, then all of them
-    by `noise` mean edges in each coordinate (one sigma).
+    Vertices off the creases move inside their faces, by up to a quarter of their shortest edge in
+    each direction, then all of them by `noise` mean edges in each coordinate (one sigma).
     """
     import igl
 
@@ -110,7 +109,12 @@ def roughened(V: np.ndarray, F: np.ndarray, noise: float, times: int = 2, seed: 
     creases = creases_of(V, F)
     N = igl.per_vertex_normals(V, F)
     rng = np.random.default_rng(seed)
-    D = rng.uniform(-0.25, 0.25, V.shape) * mean_edge(V, F)
+    shortest = np.full(len(V), np.inf)
+    for a, b in zip(F.T, np.roll(F, 1, axis=1).T, strict=True):
+        length = np.linalg.norm(V[a] - V[b], axis=1)
+        np.minimum.at(shortest, a, length)
+        np.minimum.at(shortest, b, length)
+    D = rng.uniform(-0.25, 0.25, V.shape) * shortest[:, None]
     D -= (D * N).sum(axis=1, keepdims=True) * N
     D[np.unique(list(creases)).astype(int)] = 0
     return V + D + noise * mean_edge(V, F) * rng.normal(size=V.shape), F, creases

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import topology
 from scipy.sparse import coo_matrix
@@ -55,26 +57,47 @@ def tree_of(mesh: Mesh, parallel: bool = False) -> Tree:
     return build_tree(mesh.X, mesh.origin.reshape(-1, 3), mesh.twin, patch, parallel)
 
 
+def draw(mesh: Mesh, *paths) -> list[int]:
+    """Put curves along paths of vertices, named as in `polyline`; returns a half-edge of each edge.
+
+    Vertices where other than two edges of curves meet become fixed. Births are left as they are.
+    """
+    drawn = [h for path in paths for a, b in pairwise(path) for h in half_edges(mesh, a, b)[:1]]
+    for h in drawn:
+        t = int(mesh.twin[h])
+        mesh.curve[h] = name = h if t == NONE else min(h, t)
+        if t != NONE:
+            mesh.curve[t] = name
+    meeting = curve_edges(mesh)
+    for v in {int(v) for edge in meeting for v in edge}:
+        mesh.kind[v] = CURVE if sum(v in edge for edge in meeting) == 2 else FIXED
+    return drawn
+
+
+def curve_edges(mesh: Mesh) -> dict[frozenset[int], int]:
+    """Map edges on curves, as pairs of vertices, to their curve."""
+    found = {}
+    for h in np.flatnonzero((mesh.curve != NONE) & (mesh.origin != DEAD)).tolist():
+        found[frozenset((int(mesh.origin[h]), int(mesh.origin[next_of(h)])))] = int(mesh.curve[h])
+    return found
+
+
 def featured(
     mesh: Mesh, length: float | None = None, vertex_source=None, parallel: bool = False, **wanted
 ) -> Built:
     """Find and mark the features of a mesh: all that `build_reference` returns.
 
-    ``wanted`` are the keywords of `make_constraints`, in terms of this mesh's vertices and faces; no
-    creases unless ``feature_angle`` is among them. ``length`` None leaves the lengths as they are.
+    ``wanted`` are the keywords of `make_constraints`, in terms of the vertices before the surface was
+    cut; no creases unless ``feature_angle`` is among them. ``length`` None leaves lengths as they are.
     """
-    n, F = len(mesh.X), mesh.origin.reshape(-1, 3)
     if length is not None:
         mesh.X[:, 3] = length
     if vertex_source is None:
-        vertex_source = np.arange(n, dtype=np.int32)
-    constraints = make_constraints(n, F.astype(np.int64), **{"feature_angle": None, **wanted})
-    faces = np.arange(len(F))
-    hard = constraints.hard_edges(mesh, np.arange(n, dtype=np.int32), faces)
-    held = constraints.held_faces(faces)
-    fixed = np.zeros(n, bool)
-    fixed[constraints.fixed_vertices] = True
-    return build_reference(mesh, vertex_source, constraints, hard, held, fixed, parallel)
+        vertex_source = np.arange(len(mesh.X), dtype=np.int32)
+    F = vertex_source[mesh.origin.reshape(-1, 3)].astype(np.int64)
+    constraints = make_constraints(int(F.max()) + 1, F, **{"feature_angle": None, **wanted})
+    marks = constraints.on_mesh(mesh, vertex_source, np.arange(len(F)), None)
+    return build_reference(mesh, vertex_source, constraints.feature_angle, marks, parallel)
 
 
 def referenced(mesh: Mesh, length: float | None = None, **wanted) -> Reference:
@@ -115,10 +138,16 @@ def faces_of(mesh: Mesh) -> np.ndarray:
 
 def half_edge(mesh: Mesh, a: int, b: int) -> int:
     """Find the half-edge from a to b."""
+    return next(h for h in half_edges(mesh, a, b) if mesh.origin[h] == a)
+
+
+def half_edges(mesh: Mesh, a: int, b: int) -> list[int]:
+    """Find the two half-edges between a and b, or the one on the boundary."""
     F = mesh.origin.reshape(-1, 3)
-    f, c = np.nonzero((a == F) & (np.roll(F, -1, axis=1) == b))
-    assert len(f) == 1
-    return int(3 * f[0] + c[0])
+    G = np.roll(F, -1, axis=1)
+    f, c = np.nonzero(((a == F) & (b == G)) | ((b == F) & (a == G)))
+    assert 1 <= len(f) <= 2, f"edge {a}-{b} has {len(f)} sides"
+    return (3 * f + c).tolist()
 
 
 def assert_same_bits(one: Mesh, two: Mesh) -> None:

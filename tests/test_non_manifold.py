@@ -41,7 +41,9 @@ def assert_complex_kept(result, known, V, F, L):
     assert_corners(V2, known.corners, size)
     joints, given = junction_edges(F2), junction_edges(F)
     # Junction vertices lie on the input's junction curves, which the new ones cover.
-    chord = ON * size if known.straight else sag(1.5 * L, known.radius)
+    # New vertices lie on chords of the input's curves, whose corners they cut.
+    own = sag(lengths_of(V, given).max(), known.radius) if not known.straight else 0.0
+    chord = ON * size if known.straight else sag(1.5 * L, known.radius) + own
     assert to_segments(V2[np.unique(joints)], V[given]).max() < ON * size
     assert to_segments(along(V2[joints]), V[given]).max() <= chord
     assert to_segments(along(V[given]), V2[joints]).max() <= chord
@@ -53,7 +55,7 @@ def assert_complex_kept(result, known, V, F, L):
         assert away < NEAR * size
         assert zoo.area(V2, F2) == pytest.approx(zoo.area(V, F), rel=NEAR)
     else:
-        assert away < sag(1.5 * L, known.radius)
+        assert away < sag(1.5 * L, known.radius) + own
 
 
 @pytest.mark.parametrize("factor", [0.08, 0.2, 0.45])
@@ -237,7 +239,7 @@ def test_pinched_vertices(name, factor):
     assert patches(result.F)[0] == patches(F)[0] == 2
     assert found["loops"] == expected["loops"]
     assert found["euler"] + pinched_count(result.F) == expected["euler"] + pinched_count(F)
-    assert zoo.area(*result) == pytest.approx(zoo.area(V, F), rel=0.03)
+    assert zoo.area(*result) == pytest.approx(zoo.area(V, F), rel=0.03 * factor)
     assert to_surface(result.V, V, F).max() < NEAR * diagonal(V)
 
 

@@ -107,7 +107,8 @@ def test_a_rim_outside_the_selection_stays():
     assert edge_places(V, outside) <= places
     new = boundary_edges(result.F)
     left = (result.V[new][:, :, 0] <= 9).all(axis=1)
-    assert lengths_of(result.V, new[left]).mean() == pytest.approx(0.4, rel=0.25)
+    # Between corners 1 apart there is room for two edges or three.
+    assert lengths_of(result.V, new[left]).mean() == pytest.approx(0.4, rel=0.3)
 
 
 @pytest.mark.parametrize("move", [(1.0, 1e6 + 0.1), (1e-7 / 3, 0.0), (7e5, -0.3)])

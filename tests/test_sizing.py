@@ -360,8 +360,16 @@ def test_linear_fields_at_the_limit_stay():
     for angle in zoo.turn(7):
         lengths = 2 + slope * (V[:, :2] @ [np.cos(angle), np.sin(angle)])
         assert np.array_equal(limit_gradation(*arrays(mesh), lengths, 1.4), lengths)
-        steeper = 2 + 1.1 * (lengths - 2)
+        steeper = 2 + (1 + 1e-8) * (lengths - 2)
         assert (limit_gradation(*arrays(mesh), steeper, 1.4) < steeper).mean() > 0.5
+
+
+def test_rounding_in_faces_without_height_lowers_nothing():
+    V, F = zoo.upsampled(*zoo.flat_cap(), 3, 0.0)
+    mesh = built(zoo.rotate(V), F)
+    for angle in zoo.turn(7):
+        lengths = 2 + 0.99 * gradation_slope(1.4) * (V[:, :2] @ [np.cos(angle), np.sin(angle)])
+        assert np.array_equal(limit_gradation(*arrays(mesh), lengths, 1.4), lengths)
 
 
 def test_growth_goes_with_the_distance_on_the_surface():
@@ -434,7 +442,7 @@ def test_constant_lengths_make_equilateral_faces():
     )
 
 
-@pytest.mark.parametrize("spread", [0.0, 1e-12, 1e-5, 4e-4, 0.0012, 0.1, 1.0])
+@pytest.mark.parametrize("spread", [0.0, 1e-15, 1e-12, 1e-5, 4e-4, 0.0012, 0.1, 1.0])
 def test_varying_lengths_are_integrated(spread):
     mesh = built(*zoo.ZOO["l_prism"].make())
     lengths = 0.3 * 10 ** (spread * np.random.default_rng(1).uniform(-1, 1, len(mesh.X)))

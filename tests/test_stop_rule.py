@@ -52,8 +52,8 @@ def flips(result):
 def test_operations_decay(name, factor):
     """Edges between 4/5 and 4/3 L are left alone, so halves and merged edges must not come back.
 
-    What a few stubborn edges do is allowed: half a percent of the edges a sweep, one and a half where
-    the projection sets in.  Without care boundaries split and collapse the same 5 % for ever.
+    What a few stubborn edges do is allowed: half a percent of the edges a sweep and two more, one and a
+    half where the projection sets in.  Without care boundaries split and collapse the same 5 % for ever.
     """
     V, F = loaded(name)
     if factor == 0.4 and len(F) > 4000:
@@ -63,9 +63,9 @@ def test_operations_decay(name, factor):
     count = operations(result)
     assert len(count) == 30
     edges = len(edge_lengths(*result))
-    assert count[15:].mean() <= 0.005 * edges + 1
-    assert count[15:].max() <= 0.015 * edges + 3
-    assert count[10:].max() <= 0.02 * edges + 3
+    assert count[15:].mean() <= 0.005 * edges + 2
+    assert count[15:].max() <= 0.015 * edges + 5
+    assert count[10:].max() <= 0.02 * edges + 5
     assert flips(result)[15:].mean() <= 0.005 * edges + 1
     # Ten sweeps do no more than the ten before them, but for a rest: the last eight project.
     first, second, third = count.reshape(3, 10).sum(axis=1)
@@ -75,8 +75,11 @@ def test_operations_decay(name, factor):
 
 @pytest.mark.parametrize("boundary", ["split", "fixed"])
 def test_operations_decay_at_held_boundaries(boundary):
-    """Edges that are too long or too short and must stay do not count, and do no harm."""
-    for V, F in (zoo.planar_delaunay(400), zoo.cylinder(30, 9)):
+    """Edges that are too long or too short and must stay do not count, and do no harm.
+
+    Up to some four times L: a single edge of thirty L keeps five percent of all edges busy.
+    """
+    for V, F in (zoo.upsampled(*zoo.grid(9, 9), noise=0.2), zoo.cylinder(30, 9)):
         for factor in (0.5, 2.0):
             result = remesh(
                 V, F, factor * zoo.mean_edge(V, F), boundary=boundary, iterations=30, split=4 / 3,

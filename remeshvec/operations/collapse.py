@@ -65,7 +65,7 @@ def collapse_short_edges(
     """Collapse the short edges but for those with siblings; returns counts by outcome."""
     candidates = np.empty(mesh.origin.size, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _find_short_edges(parallel, mesh, blocks, 0.5 * limits.shortest, candidates, count)
+    _find_short_edges(parallel, mesh, blocks, limits.shortest, candidates, count)
     tally = np.zeros((len(count), N_OUTCOMES), np.int64)
     if count.any():
         for stage in stages(blocks):
@@ -75,7 +75,7 @@ def collapse_short_edges(
 
 
 @driver
-def _find_short_edges(mesh, blocks, half_factor, candidates, count):
+def _find_short_edges(mesh, blocks, factor, candidates, count):
     for k in prange(blocks.face.size - 1):
         end = 3 * blocks.face[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
@@ -87,18 +87,28 @@ def _find_short_edges(mesh, blocks, half_factor, candidates, count):
             l0 = distance_squared(mesh.X, a, b)
             l1 = distance_squared(mesh.X, b, c)
             l2 = distance_squared(mesh.X, c, a)
-            m0 = half_factor * (mesh.X[a, 3] + mesh.X[b, 3])
-            m1 = half_factor * (mesh.X[b, 3] + mesh.X[c, 3])
-            m2 = half_factor * (mesh.X[c, 3] + mesh.X[a, 3])
+            sa, sb, sc = mesh.X[a, 3], mesh.X[b, 3], mesh.X[c, 3]
             # Stores without branches: whether an edge is short cannot be predicted.
             h = 3 * f
             candidates[end] = h
-            end += (l0 < m0 * m0) & (mesh.twin[h] < h)
+            end += is_short(l0, sa, sb, factor) & (mesh.twin[h] < h)
             candidates[min(end, h + 1)] = h + 1
-            end += (l1 < m1 * m1) & (mesh.twin[h + 1] < h + 1)
+            end += is_short(l1, sb, sc, factor) & (mesh.twin[h + 1] < h + 1)
             candidates[min(end, h + 2)] = h + 2
-            end += (l2 < m2 * m2) & (mesh.twin[h + 2] < h + 2)
+            end += is_short(l2, sc, sa, factor) & (mesh.twin[h + 2] < h + 2)
         count[k] = end - 3 * blocks.face[k]
+
+
+@inlined
+def is_short(length_squared, s, t, factor):
+    """Tell whether an edge is shorter than a factor of the harmonic mean of its ends' target lengths.
+
+    Splits take the arithmetic mean: where lengths jump, beside an edge that must not be split, there
+    is room between the two.
+    """
+    total = s + t
+    product = 2.0 * factor * s * t
+    return length_squared * total * total < product * product
 
 
 @driver
@@ -142,8 +152,8 @@ def _examine(mesh, h, low, high, limits, faces, ring, normals):
     b = np.int64(mesh.origin[following(h)])
     if b < low or b >= high:
         return OUTSIDE, 0.0, 0.0, 0.0, 0.0, 0, 0
-    shortest = 0.5 * limits.shortest * (mesh.X[a, 3] + mesh.X[b, 3])
-    if not distance_squared(mesh.X, a, b) < shortest * shortest:
+    length = distance_squared(mesh.X, a, b)
+    if not is_short(length, mesh.X[a, 3], mesh.X[b, 3], limits.shortest):
         return GONE, 0.0, 0.0, 0.0, 0.0, 0, 0
     if not keeps_curves(mesh, h, a, b):
         return KEPT_CURVE, 0.0, 0.0, 0.0, 0.0, 0, 0

@@ -16,6 +16,7 @@ from .._jit import driver, inlined
 from .._types import (
     CURVE,
     DEAD,
+    FIXED,
     INNER,
     MAX_VALENCE,
     NONE,
@@ -46,6 +47,7 @@ class Reference(NamedTuple):
     X: FloatArray  # (n, 4), target lengths in the last column
     origin: IndexArray  # (3 m,)
     beside: IndexArray  # (2, 3 m), see `polyline.join_edges`
+    arcs: FloatArray  # (3, 3 m), see `polyline.measure_arcs`
 
 
 def project_vertices(
@@ -66,7 +68,7 @@ def project_vertices(
 def project_curves(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
     """Move vertices on curves only: they slide in every sweep, the others drift for some."""
     if reference.beside.shape[1]:
-        _project_curves(parallel, mesh, blocks, *reference[1:], mesh.X, mesh.birth)
+        _project_curves(parallel, mesh, blocks, *reference[1:4], mesh.X, mesh.birth)
 
 
 def locate_vertices(
@@ -83,12 +85,12 @@ def locate_vertices(
         the vertex.
     """
     barycentric = np.zeros((mesh.vertex_halfedge.size, 3))
-    _locate(parallel, mesh, blocks, *reference, trust * trust, mesh.birth, barycentric)
+    _locate(parallel, mesh, blocks, *reference[:4], trust * trust, mesh.birth, barycentric)
     return barycentric
 
 
 def read_lengths(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
-    """Set the target length at every vertex to that of the reference where the vertex lies."""
+    """Set the target length at every vertex that may move to that of the reference where it lies."""
     weights = locate_vertices(mesh, blocks, reference, np.inf, parallel)
     _read_lengths(
         parallel, mesh, blocks, reference.X, reference.origin, mesh.birth, weights, mesh.X
@@ -176,7 +178,7 @@ def _locate(mesh, blocks, tree, X_in, origin, beside, trust, birth, barycentric)
 def _read_lengths(mesh, blocks, X_in, origin, birth, weights, X):
     for k in prange(blocks.vertex.size - 1):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
-            if mesh.vertex_halfedge[v] != DEAD:
+            if mesh.vertex_halfedge[v] != DEAD and mesh.kind[v] != FIXED:
                 f = np.int64(birth[v]) // 3
                 length = 0.0
                 for i in range(3):

@@ -2,22 +2,21 @@
 
 ``p += (I - n n^T) (g - p)`` with ``g = sum A_j p_j / sum A_j`` and A the mixed Voronoi area [Botsch and
 Kobbelt 2004, section 4], over the square of the target length where that varies [Dunyach et al. 2013,
-section 3]. Vertices on curves move along their curve. All vertices move at once (Jacobi). Sums run over faces, not over rings: faces
-are read in order without dependent loads, and every normal and area is made once instead of three
-times. A block adds up the faces inside its vertex range; the faces across borders come after, on one
+section 3]. All vertices move at once (Jacobi). Sums run over faces, not over rings: faces are read in
+order without dependent loads, and every normal and area is made once instead of three times. A block adds up the faces inside its vertex range; the faces across borders come after, on one
 thread, so each vertex sums in the same order on any number of threads.
 """
 
 from __future__ import annotations
 
 from math import sqrt
+
 import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined, kernel
-from .._types import CURVE, DEAD, INNER, MAX_VALENCE, NONE, Blocks, Mesh
+from .._types import CURVE, DEAD, INNER, NONE, Blocks, Mesh
 from ..geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
-from ..halfedge import following, previous
 
 __all__ = ["relax_vertices"]
 
@@ -27,7 +26,7 @@ N_SUMS = 16
 
 
 def relax_vertices(mesh: Mesh, blocks: Blocks, stiffness: float, parallel: bool) -> None:
-    """Move every inner vertex once in its tangent plane, those on curves along them.
+    """Move every inner vertex once in its tangent plane.
 
     ``stiffness`` is the hold of curved ridges on their vertices; 0 for none.
     """
@@ -181,48 +180,11 @@ def _move(mesh, blocks, stiffness, points, sums, X):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD:
                 continue
-            dx = dy = dz = 0.0
             if mesh.kind[v] == INNER:
                 dx, dy, dz = _step(points, v, sums, stiffness)
-            elif mesh.kind[v] == CURVE:
-                dx, dy, dz = _step_along_curve(mesh, points, v)
-            X[v, 0] = points[v, 0] + dx
-            X[v, 1] = points[v, 1] + dy
-            X[v, 2] = points[v, 2] + dz
-
-
-@inlined
-def _step_along_curve(mesh, P, v):
-    """Step along the chord of the two neighbours on the curve, to where both edges suit their lengths.
-
-    The same bits on every sheet that shares the curve, whichever neighbour comes first.
-    """
-    start = np.int64(mesh.vertex_halfedge[v])
-    h = start
-    u = w = np.int32(NONE)
-    for _ in range(MAX_VALENCE):
-        if mesh.curve[h] != NONE:
-            u, w = w, mesh.origin[following(h)]
-        p = previous(h)
-        h = np.int64(mesh.twin[p])
-        if h == NONE:
-            u, w = w, mesh.origin[p]
-            break
-        if h == start:
-            break
-    if u == NONE:
-        return 0.0, 0.0, 0.0
-    at_u = mesh.X[w, 3] + mesh.X[v, 3]
-    at_w = mesh.X[u, 3] + mesh.X[v, 3]
-    along = 0.0
-    length = 0.0
-    for i in range(3):
-        direction = P[w, i] - P[u, i]
-        aim = (P[u, i] * at_u + P[w, i] * at_w) / (at_u + at_w)
-        length += direction * direction
-        along += direction * (aim - P[v, i])
-    share = along / length if length > 0.0 else 0.0
-    return share * (P[w, 0] - P[u, 0]), share * (P[w, 1] - P[u, 1]), share * (P[w, 2] - P[u, 2])
+                X[v, 0] = points[v, 0] + dx
+                X[v, 1] = points[v, 1] + dy
+                X[v, 2] = points[v, 2] + dz
 
 
 @inlined

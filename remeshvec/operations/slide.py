@@ -1,0 +1,119 @@
+"""Slide: vertices on curves move along their curve, to where the edges to both neighbours suit.
+
+The position is the arc length along the polyline of the input: chords would not do, on a small hole
+three vertices in a row would run together. All vertices move at once, from where they lie on the curve;
+all sheets that share a curve compute the same bits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from .._jit import driver, inlined
+from .._types import CURVE, DEAD, FIXED, MAX_VALENCE, NONE, Blocks, FloatArray, Mesh
+from ..halfedge import following, previous
+from ..polyline import move_on_curve
+from .project import Reference, project_curves
+
+__all__ = ["slide_vertices"]
+
+
+def slide_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
+    """Move all vertices on curves once."""
+    if not reference.beside.shape[1]:
+        return
+    project_curves(mesh, blocks, reference, parallel)
+    arc = np.zeros(mesh.vertex_halfedge.size)
+    _find_arcs(parallel, mesh, blocks, *reference[1:], arc)
+    _slide(parallel, mesh, blocks, *reference[1:], arc, mesh.X, mesh.birth)
+
+
+@driver
+def _find_arcs(mesh, blocks, X_in, origin, beside, arcs, arc):
+    """Arc length at which each vertex lies on its curve."""
+    for k in prange(blocks.vertex.size - 1):
+        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
+            if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] < CURVE or mesh.kind[v] == FIXED:
+                continue
+            h = np.int64(mesh.birth[v])
+            a = origin[h]
+            b = origin[following(h)]
+            along = 0.0
+            length = 0.0
+            for i in range(3):
+                direction = X_in[b, i] - X_in[a, i]
+                along += direction * (mesh.X[v, i] - X_in[a, i])
+                length += direction * direction
+            s = along / length if length > 0.0 else 0.0
+            arc[v] = arcs[0, h] + s * (arcs[1, h] - arcs[0, h])
+
+
+@driver
+def _slide(mesh, blocks, X_in, origin, beside, arcs, arc, X, birth):
+    for k in prange(blocks.vertex.size - 1):
+        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
+            if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != CURVE:
+                continue
+            u, w = _neighbours(mesh, v)
+            if u == NONE:
+                continue
+            here = np.int64(birth[v])
+            step = _step(mesh, arc, v, u, w, arcs[2, here])
+            h, s = move_on_curve(X_in, origin, beside, arcs, here, arc[v] + step)
+            birth[v] = h
+            a = origin[h]
+            b = origin[following(h)]
+            for i in range(3):
+                X[v, i] = X_in[a, i] + s * (X_in[b, i] - X_in[a, i])
+
+
+@inlined
+def _neighbours(mesh, v):
+    """Both neighbours on the curve, ``NONE`` where there are not two."""
+    start = np.int64(mesh.vertex_halfedge[v])
+    h = start
+    u = w = np.int64(NONE)
+    for _ in range(MAX_VALENCE):
+        if mesh.curve[h] != NONE:
+            u, w = w, np.int64(mesh.origin[following(h)])
+        p = previous(h)
+        h = np.int64(mesh.twin[p])
+        if h == NONE:
+            return w, np.int64(mesh.origin[p])
+        if h == start:
+            break
+    return u, w
+
+
+@inlined
+def _step(mesh, arc, v, u, w, total):
+    """Arc length to the point where the edges to both neighbours are as their target lengths.
+
+    The order of the neighbours does not matter. Corners lie at the ends of their curve, on the side
+    where the other neighbour is not.
+    """
+    t = arc[v]
+    su, sw = mesh.X[u, 3], mesh.X[w, 3]
+    if total < 0.0:
+        fixed_u = mesh.kind[u] == FIXED
+        fixed_w = mesh.kind[w] == FIXED
+        if fixed_u and fixed_w:
+            return -0.5 * total - t
+        tu, tw = arc[u], arc[w]
+        if fixed_u:
+            tu = 0.0 if tw > t else -total
+        elif fixed_w:
+            tw = 0.0 if tu > t else -total
+        forward_is_u = tu > tw
+        ahead = max(tu, tw) - t
+        behind = t - min(tu, tw)
+    else:
+        du = (arc[u] - t) % total
+        dw = (arc[w] - t) % total
+        forward_is_u = du < dw
+        ahead = min(du, dw)
+        behind = total - max(du, dw)
+    s_ahead = mesh.X[v, 3] + (su if forward_is_u else sw)
+    s_behind = mesh.X[v, 3] + (sw if forward_is_u else su)
+    return (ahead * s_behind - behind * s_ahead) / (s_ahead + s_behind)
