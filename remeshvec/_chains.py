@@ -31,7 +31,7 @@ COMPONENT_LENGTH = 8.0
 CLOSED_EDGES = 6  # of a sure component without loose ends, however short
 CLEAN_EDGES = 4  # of a chain or component that is half clean, however short
 
-# Dropped chains leave loose ends behind. After two rounds a fifth more is kept on organic shapes;
+# Dropped chains leave loose ends behind. After two rounds a tenth more is kept on organic shapes,
 # after eight as much as after four.
 ROUNDS = 4
 

@@ -13,25 +13,20 @@ from .halfedge import following, previous
 
 __all__ = ["echoes_beside", "face_cosine"]
 
-# An echo turns by at least this share of our edge: with 0.5 and more, half as much again is kept
-# on organic shapes, and the two facets of a coarse fillet would be creases. An edge that turns by
-# this multiple is the end of the face.
+# An echo turns by at least this share of our edge: with 0.6 a quarter more is kept on organic
+# shapes, and a fillet of two segments has a crease in its middle. What turns by this multiple of it
+# is the end of the face.
 SHARE = 0.4
 MULTIPLE = 1.7
 
-# An edge met at more than 45 degrees to ours belongs to another direction of curvature; where it
-# turns by more than 60 degrees the walk is at the end of the face, too.
+# An edge met at more than 45 degrees to ours belongs to another direction of curvature.
 PARALLEL = 0.7
-STEEP = 0.5
 
 # A walk that turned by more than about 70 degrees in space is no longer beside its edge.
 AWAY = 0.3
 
 # A walk unfolds at most so many edges.
 MAX_STEPS = 24
-
-# 1e-6 degrees at 30 degrees, so that equal facets are equal whatever the rounding.
-COSINE_TOLERANCE = 1e-8
 
 
 @inlined
@@ -129,8 +124,8 @@ def echoes_beside(X, origin, twin, normals, is_hard, h, reach):
         Whether the walk ended where the face does, so that there might be more of them.
     """
     turn = acos(min(1.0, max(-1.0, face_cosine(normals, h // 3, twin[h] // 3))))
-    quiet = cos(SHARE * turn) + COSINE_TOLERANCE
-    loud = cos(min(3.0, MULTIPLE * turn)) + COSINE_TOLERANCE
+    quiet = cos(SHARE * turn)
+    loud = cos(min(3.0, MULTIPLE * turn))
     convex = _is_convex(X, origin, normals, h, twin[h])
     x0, y0, z0 = _direction(X, origin, normals, h, 0.0, 1.0)
     echoes = 0
@@ -158,8 +153,6 @@ def echoes_beside(X, origin, twin, normals, is_hard, h, reach):
             left = reach
             if echoes == 2:
                 return echoes, False
-        elif cosine < STEEP:
-            return echoes, True
         g = t
         if echoes == 0:
             xd, yd, zd = _direction(X, origin, normals, g, u, w)

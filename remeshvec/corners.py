@@ -22,6 +22,11 @@ CORNER_TURN = 50.0
 # On an arc of any radius the turn over L / 2 is half of that over L; at a corner they are the same.
 CORNER_SHARE = 0.7
 
+# Unless the next corner is near, as at the end of a strip about as wide as L / 2. There the turn
+# over L / 4 still is that over L / 2. At 0.88 the two tests leave no gap between them on a strip of
+# any width; below, they would find corners on a circle of 8 sides.
+LOCAL_SHARE = 0.88
+
 # Curves shorter than 4 L are measured at this share of their length: a circle turns by 45 degrees
 # there, and a rectangle keeps its corners, up to sides of 3 to 1.
 SHORT_SHARE = 0.125
@@ -125,9 +130,11 @@ def _sharp_turn(X, path, at, n, is_loop, i, limit):
     """Turn in degrees where it is sharp and local, otherwise 0."""
     reach = _reach(X, path, at, n, i)
     near = _turn(X, path, at, n, is_loop, i, reach)
-    if near > limit and near >= CORNER_SHARE * _turn(X, path, at, n, is_loop, i, 2.0 * reach):
+    if near <= limit:
+        return 0.0
+    if near >= CORNER_SHARE * _turn(X, path, at, n, is_loop, i, 2.0 * reach):
         return near
-    return 0.0
+    return near if _turn(X, path, at, n, is_loop, i, 0.5 * reach) >= LOCAL_SHARE * near else 0.0
 
 
 @inlined

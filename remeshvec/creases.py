@@ -199,24 +199,20 @@ def _fill_normal(X, origin, f, normals, state):
 
 @inlined
 def _lend_normals(X, origin, twin, normals, state):
-    """Give slivers the normal across their longest side, so that a crease runs along the others.
+    """Give slivers the normal across their longest side that has one, round by round.
 
-    In later rounds any side will do.
+    So a crease that runs along a cap goes over its short sides, in one piece.
     """
-    for i in range(SLIVER_ROUNDS):
-        share = 0.8 if 2 * i < SLIVER_ROUNDS else 0.0
+    for _ in range(SLIVER_ROUNDS):
         for f in range(origin.size // 3):
             if state[f] != MISSING:
                 continue
-            longest = 0.0
-            for h in range(3 * f, 3 * f + 3):
-                longest = max(longest, distance_squared(X, origin[h], origin[following(h)]))
-            best = share * longest
+            longest = -1.0
             for h in range(3 * f, 3 * f + 3):
                 t = twin[h]
                 side = distance_squared(X, origin[h], origin[following(h)])
-                if t != NONE and state[t // 3] != MISSING and side >= best:
-                    best = side
+                if t != NONE and state[t // 3] != MISSING and side > longest:
+                    longest = side
                     state[f] = LENT
                     for axis in range(3):
                         normals[f, axis] = normals[t // 3, axis]

@@ -18,15 +18,17 @@ from ._types import (
     INNER,
     NONE,
     PINNED,
+    SEAM,
     FloatArray,
     IndexArray,
     Mesh,
     Tree,
 )
 from .bvh import build_tree, closest_faces
+from .polyline import find_siblings
 from .reference import Built
 
-__all__ = ["DeviationGuard", "sample_mesh"]
+__all__ = ["DeviationGuard", "edges_to_refine", "sample_mesh", "shortened_lengths"]
 
 # Barycentric coordinates of the samples of a face besides its vertices: the middles of its edges, its
 # centroid, and the centroids of its quarters at the corners.
@@ -131,6 +133,62 @@ class DeviationGuard:
         """Largest distance of a sample, each way."""
         _, to_input, from_input = self.distances(mesh, 0.0)
         return {"to_input": float(to_input.max()), "from_input": float(from_input.max())}
+
+
+def _worst_distances(
+    mesh: Mesh, built: Built, trust: float, parallel: bool
+) -> FloatArray:
+    """Largest distance of a sample of each face of a compact mesh from the input."""
+    F = mesh.origin.reshape(-1, 3)
+    points, face = sample_mesh(mesh.X, F)
+    hint = _hints(mesh, F, mesh.source)[face]
+    _, distance = closest_faces(built.reference.tree, points, hint, trust, parallel)
+    return distance.reshape(len(F), -1).max(axis=1)
+
+
+def shortened_lengths(
+    mesh: Mesh, built: Built, tolerance: float, parallel: bool
+) -> FloatArray:
+    """Target lengths at the vertices of the input, shorter where faces are off by more than a tolerance.
+
+    The error goes with the square of the length; a length falls by no more than 0.7 at a time.
+    """
+    worst = _worst_distances(mesh, built, tolerance, parallel)
+    X = built.reference.X
+    anywhere = np.full(len(X), NONE, np.int32)
+    face, _ = closest_faces(_tree_of(mesh, parallel), X[:, :3], anywhere, 0.0, parallel)
+    share = tolerance / np.maximum(worst[face], tolerance)
+    return np.asarray(X[:, 3] * np.maximum(np.sqrt(share), 0.7))
+
+
+def edges_to_refine(
+    mesh: Mesh, built: Built, tolerance: float, parallel: bool
+) -> IndexArray:
+    """Longest edge of every face with a sample farther than ``tolerance`` from the input.
+
+    Only where it is longer than its target: shorter ones follow ridges of the input's own faces, which
+    splits come no nearer to.
+
+    Returns
+    -------
+    (k,) int32
+        Half-edges that may be split; on seams, those of all sheets.
+    """
+    faces = np.flatnonzero(_worst_distances(mesh, built, tolerance, parallel) > tolerance)
+    F = mesh.origin.reshape(-1, 3)
+    corners = mesh.X[F[faces], :3]
+    length = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2)
+    length[mesh.curve.reshape(-1, 3)[faces] == FROZEN] = 0.0
+    edges = 3 * faces + length.argmax(axis=1)
+    edges = edges[length.max(axis=1) > mesh.X[F[faces], 3].mean(axis=1)]
+    if built.on_seam is not None:
+        on_seam = np.flatnonzero(mesh.curve >= SEAM).astype(np.int32)
+        members, group = find_siblings(mesh.X, mesh.origin, on_seam)
+        chosen = np.isin(members, edges)
+        if chosen.any():
+            chosen = np.logical_or.reduceat(chosen, group[:-1])
+            edges = np.union1d(edges, members[np.repeat(chosen, np.diff(group))])
+    return edges.astype(np.int32)
 
 
 def _tree_of(mesh: Mesh, parallel: bool) -> Tree:

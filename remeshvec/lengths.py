@@ -19,7 +19,7 @@ from .halfedge import following
 from .prepare import Prepared
 from .sizing import Adaptive, adaptive_lengths, expected_faces, limit_gradation, target_lengths
 
-__all__ = ["Measures", "check_gradation", "measure", "set_lengths"]
+__all__ = ["Measures", "adaptive_limits", "check_gradation", "limited_lengths", "measure", "set_lengths"]
 
 # Longest target length in the frame of `Prepared`, where the mesh has an extent below 2: longer ones
 # mean the same, and their squares might overflow.
@@ -27,6 +27,14 @@ _LONGEST = 1e6
 
 # Edges of a remeshed surface are on average as long as the target, and its faces about equilateral.
 _FACE = sqrt(3.0) / 4.0
+
+
+# Edges spread around their target, and errors go with their square. Of the faces made for this share of
+# the tolerance about two in a hundred exceed it, and are split at the end.
+_ADAPTIVE_SHARE = 0.9
+
+# Where no face may exceed the distance even on the way.
+_DEVIATION_SHARE = 0.6
 
 
 class Measures(NamedTuple):
@@ -103,7 +111,7 @@ def set_lengths(
     """
     X = prepared.mesh.X
     if isinstance(L, Adaptive):
-        lengths = _adaptive(prepared, measures, L, marks.hard, feature_angle)
+        lengths = _adaptive(prepared, measures, L, marks.hard, feature_angle, _ADAPTIVE_SHARE)
     else:
         asked = target_lengths(V, L) if L is not None else 0.9 * measures.mean_edge / prepared.scale
         if not isinstance(asked, np.ndarray):
@@ -111,7 +119,7 @@ def set_lengths(
         lengths = _in_range(asked[prepared.vertex_source] * prepared.scale)
     if max_deviation is not None:
         lengths = _near_input(prepared, measures, lengths, max_deviation, marks.hard, feature_angle)
-    X[:, 3] = _limited(prepared, lengths, gradation)
+    X[:, 3] = limited_lengths(prepared, lengths, gradation)
     expected = expected_faces(X, prepared.mesh.origin, X[:, 3])
     _check_output(prepared, measures, expected, max_faces)
     return sqrt(measures.area / (expected * _FACE))
@@ -136,7 +144,7 @@ def _near_input(
         count += np.bincount(end, minlength=len(own))
     own /= np.maximum(count, 1)
     spec = Adaptive(distance, 1e-3 * distance, max(float(lengths.max()), distance) / prepared.scale)
-    curved = _adaptive(prepared, measures, spec, hard, feature_angle)
+    curved = _adaptive(prepared, measures, spec, hard, feature_angle, _DEVIATION_SHARE)
     return np.minimum(lengths, np.maximum(curved, 0.5 * own))
 
 
@@ -145,24 +153,33 @@ def _in_range(lengths: Any) -> Any:
     return np.clip(lengths, 5e-324, _LONGEST)
 
 
+def adaptive_limits(prepared: Prepared, spec: Adaptive) -> tuple[float, float]:
+    """Shortest and longest length, in the frame of the mesh."""
+    extent = float(np.ptp(prepared.mesh.X[:, :3], axis=0).max())
+    shortest, longest = spec.limits(extent / prepared.scale)
+    return shortest * prepared.scale, longest * prepared.scale
+
+
 def _adaptive(
     prepared: Prepared,
     measures: Measures,
     spec: Adaptive,
     hard: NDArray[np.bool_],
     feature_angle: float | str | None,
+    share: float,
 ) -> FloatArray:
+    """Lengths from curvature for a share of the tolerance."""
     mesh = prepared.mesh
-    shortest, longest = spec.limits(float(np.ptp(mesh.X[:, :3], axis=0).max()) / prepared.scale)
-    shortest, longest = shortest * prepared.scale, longest * prepared.scale
+    shortest, longest = adaptive_limits(prepared, spec)
     # Creases are sought at the scale of the input's edges: the lengths follow from them.
     mesh.X[:, 3] = min(max(measures.mean_edge, shortest), longest)
     arrays = (mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge)
     is_feature, _ = find_creases(*arrays, hard, feature_angle)
-    return adaptive_lengths(*arrays, is_feature, spec.tolerance * prepared.scale, shortest, longest)
+    tolerance = share * spec.tolerance * prepared.scale
+    return adaptive_lengths(*arrays, is_feature, tolerance, shortest, longest)
 
 
-def _limited(prepared: Prepared, lengths: FloatArray, gradation: float) -> FloatArray:
+def limited_lengths(prepared: Prepared, lengths: FloatArray, gradation: float) -> FloatArray:
     """Bound the growth of lengths, also from sheet to sheet where they meet."""
     mesh, source = prepared.mesh, prepared.vertex_source
     if lengths.max() == lengths.min():

@@ -16,7 +16,14 @@ from ._types import FloatArray, Mesh
 from .constraints import Constraints, make_constraints
 from .errors import OptionError
 from .extract import extract
-from .lengths import Measures, check_gradation, measure, set_lengths
+from .lengths import (
+    Measures,
+    adaptive_limits,
+    check_gradation,
+    limited_lengths,
+    measure,
+    set_lengths,
+)
 from .options import Options, make_options
 from .prepare import Prepared, prepare
 from .reference import Built, build_reference
@@ -198,6 +205,11 @@ def remesh(
         with watch.time("build"):
             prepared = prepare(vertices, faces, sweeps.is_parallel(len(faces)))
         sweeps.scale = prepared.scale
+        sweeps.gradation = sizing.gradation
+        if isinstance(L, Adaptive):
+            sweeps.tolerance = L.tolerance * prepared.scale
+            sweeps.shortest = adaptive_limits(prepared, L)[0]
+            sweeps.limit_lengths = lambda x: limited_lengths(prepared, x, sizing.gradation)
         job = _Job(prepared, measure(prepared), constraints, vertices, sizing, sweeps)
         done = job.run() if count is None else _meet_count(job, *count)
     with watch.time("extract"):

@@ -11,6 +11,8 @@ import numpy as np
 from ._types import (
     CURVE,
     DEAD,
+    FIXED,
+    FROZEN,
     HELD,
     INNER,
     NONE,
@@ -22,7 +24,7 @@ from ._types import (
     Mesh,
 )
 from .clean import weld_vertices
-from .deviation import DeviationGuard
+from .deviation import DeviationGuard, edges_to_refine, shortened_lengths
 from .edge_sets import make_blocks
 from .operations.collapse import CollapseLimits, collapse_short_edges, collapse_siblings
 from .operations.fit import fit_vertices
@@ -56,6 +58,24 @@ _FIT_REACH = 0.2
 _ATTEMPTS = 8
 
 
+# Rounds over all edges that bound the growth of lengths; each reaches one edge further.
+_GRADATION_ROUNDS = 32
+
+# Faces made for a tolerance are moved until their centroids, which are not where they are worst, and
+# split until their samples keep these shares of it. Where more than this share of all faces would be
+# split, the input is rougher than the tolerance, and splits would follow its own faces.
+_CENTROID_SHARE = 0.88
+_SAMPLE_SHARE = 0.985
+_ROUGH = 0.05
+
+# Sweeps, counted from the last one as 1, after which lengths are compared with what they led to.
+_FEEDBACK = (7, 5, 3)
+
+# Rounds of moves that make the largest faces smaller; then of splits where chords are still too long,
+# each of which takes a quarter off the error.
+_EVENING_ROUNDS = 8
+_REFINEMENTS = 3
+
 # So many sweeps that split and collapse about as many edges, and below this share of all, go in circles.
 _CYCLE = 4
 _CALM = 0.05
@@ -72,6 +92,12 @@ class Sweeps:
         self.may_run = may_run
         self.callback = callback
         self.scale = 1.0  # of the frame that meshes come in
+        # Where lengths follow from the curvature: the largest distance of a chord, the shortest length,
+        # and what bounds the growth of lengths on the input.
+        self.gradation = np.inf
+        self.tolerance: float | None = None
+        self.shortest = 0.0
+        self.limit_lengths: Callable[[FloatArray], FloatArray] = lambda lengths: lengths
         self.guard: DeviationGuard | None = None
         self.deviation: dict[str, float] = {}
         self.is_calm = False
@@ -103,7 +129,24 @@ class Sweeps:
             )
             if self.stop == "cancelled" or self._has_converged(mesh, step):
                 break
+            if self.tolerance is not None and self.options.iterations - sweep in _FEEDBACK:
+                mesh = compact(mesh, blocks, self.is_parallel(mesh.origin.size // 3))
+                blocks = make_blocks(mesh)
+                self._shorten(mesh, built, self.tolerance)
         return mesh
+
+    def _shorten(self, mesh: Mesh, built: Built, tolerance: float) -> None:
+        """Shorten target lengths where faces made for them lie too far from the input."""
+        with self.watch.time("deviation"):
+            parallel = self.is_parallel(len(mesh.origin) // 3)
+            lengths = shortened_lengths(mesh, built, tolerance, parallel)
+            X = built.reference.X
+            old = X[:, 3].copy()
+            X[:, 3] = self.limit_lengths(np.maximum(lengths, np.minimum(old, self.shortest)))
+            # Fixed vertices keep their length, which may be that of an edge that must not be split.
+            v = np.flatnonzero(mesh.kind == FIXED)
+            at = built.reference.origin[mesh.birth[v]]
+            mesh.X[v, 3] = np.where(mesh.X[v, 3] == old[at], X[at, 3], mesh.X[v, 3])
 
     def _split_factor(self, mesh: Mesh, sweep: int) -> float:
         """Factor above which edges are split, from now on.
@@ -113,7 +156,8 @@ class Sweeps:
         """
         edges = 1.5 * np.count_nonzero(mesh.origin[::3] != DEAD)
         done = [counts["split"] + counts["collapse"] for counts in self.counts[-_CYCLE:]]
-        if len(done) == _CYCLE and done[-1] < _CALM * edges and min(done) > 0.7 * max(done):
+        few = max(_CALM * edges, 10.0)
+        if len(done) == _CYCLE and done[-1] < few and min(done) > 0.7 * max(done):
             self.is_calm = True
         factor = self.options.split[sweep]
         return max(factor, 2.5 * self.options.collapse[sweep]) if self.is_calm else factor
@@ -228,6 +272,7 @@ class Sweeps:
                 undo_folds(mesh, blocks, before, parallel)
             if varies:
                 read_lengths(mesh, blocks, built.reference, parallel)
+                _bound_gradation(mesh, self.gradation)
 
     def finish(self, mesh: Mesh, built: Built) -> tuple[Mesh, FloatArray]:
         """Untangle, fit, and find where on the input every vertex lies."""
@@ -242,9 +287,17 @@ class Sweeps:
             blocks = make_blocks(mesh)
         with self.watch.time("finish"):
             mesh, _ = self._guarded(mesh, lambda m: self._polish(m, blocks, built, parallel))
-        if self.guard is not None:
+            if self.tolerance is not None:
+                mesh = self._refine(mesh, built, self.tolerance)
+                blocks = make_blocks(mesh)
+            if np.ptp(mesh.X[:, 3]) > 0.0:
+                _bound_gradation(mesh, self.gradation)
+        guard = self.guard
+        if guard is None and self.tolerance is not None:
+            guard = DeviationGuard(built, self.tolerance, parallel)
+        if guard is not None:
             with self.watch.time("deviation"):
-                measured = self.guard.measure(mesh)
+                measured = guard.measure(mesh)
                 self.deviation = {way: d / self.scale for way, d in measured.items()}
         with self.watch.time("locate"):
             is_on_input = options.project and not options.fit_rounds
@@ -266,6 +319,32 @@ class Sweeps:
             fit_vertices(mesh, blocks, tree, _FIT_REACH, parallel)
         return 0.0
 
+    def _refine(self, mesh: Mesh, built: Built, tolerance: float) -> Mesh:
+        """Bring all faces within a tolerance of the input.
+
+        First by moving vertices: a third of the squared length is the squared circumradius of an
+        equilateral face. Then by splits of the longest edge.
+        """
+        parallel = self.is_parallel(len(mesh.origin) // 3)
+        blocks, tree = make_blocks(mesh), built.reference.tree
+        for _ in range(_EVENING_ROUNDS):
+            if not untangle_vertices(
+                mesh, blocks, tree, self.options.project, 1.0 / 3.0, parallel,
+                _CENTROID_SHARE * tolerance,
+            ):
+                break
+        for _ in range(_REFINEMENTS):
+            parallel = self.is_parallel(len(mesh.origin) // 3)
+            edges = edges_to_refine(mesh, built, _SAMPLE_SHARE * tolerance, parallel)
+            if not 0 < len(edges) <= _ROUGH * len(mesh.origin) / 3:
+                break
+            mesh = split_edges(mesh, make_blocks(mesh), edges, parallel)
+            blocks = make_blocks(mesh)
+            project_vertices(mesh, blocks, built.reference, _TRUST, parallel)
+            flips = FlipLimits(cos(radians(self.options.flip_normal)), False, True)
+            flip_edges(mesh, blocks, flips, parallel)
+        return mesh
+
     def _has_converged(self, mesh: Mesh, step: float) -> bool:
         """Tell whether a sweep changed few edges and hardly moved the vertices."""
         tol = self.options.tol
@@ -286,6 +365,29 @@ class Sweeps:
         if self.callback(sweep, phase, self.counts[-1].get(phase, 0)) is False:
             self.stop = "cancelled"
         return self.stop == "cancelled"
+
+
+def _bound_gradation(mesh: Mesh, gradation: float) -> None:
+    """Lower target lengths until the ratio along every edge is within bounds.
+
+    They are on the surface of the input already; an edge may take a short cut there. At edges that
+    must stay lengths are what these ask for.
+    """
+    h = np.flatnonzero(mesh.origin != DEAD)
+    a, b = mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]
+    frozen = np.zeros(len(mesh.X), np.bool_)
+    frozen[a[mesh.curve[h] == FROZEN]] = True
+    frozen[b[mesh.curve[h] == FROZEN]] = True
+    free = ~(frozen[a] | frozen[b])
+    a, b = a[free], b[free]
+    lengths = mesh.X[:, 3]
+    for _ in range(_GRADATION_ROUNDS):
+        steep = lengths[a] > gradation * lengths[b]
+        back = lengths[b] > gradation * lengths[a]
+        if not (steep.any() or back.any()):
+            break
+        np.minimum.at(lengths, a[steep], gradation * lengths[b[steep]])
+        np.minimum.at(lengths, b[back], gradation * lengths[a[back]])
 
 
 def _siblings(mesh: Mesh) -> tuple[IndexArray, IndexArray]:

@@ -196,6 +196,24 @@ def test_of_close_corners_the_larger_stays():
     assert {(0, 0), (2, 0), (2, 1), (0, 1)} <= set(found) and len(found) < 8
 
 
+def test_strips_of_any_width_keep_their_ends():
+    """Both corners while the strip is wider than L / 2; a single tip where it is narrower."""
+    V, F = polygon([[0, 0], [10, 0], [10, 1], [0, 1]], 0.05)
+    for length in np.arange(0.35, 6.0, 0.1):
+        found = V[corners_of(V, F, length), 0]
+        assert sorted(found) == ([0, 0, 10, 10] if length <= 2 else [0, 10])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_equal_corners(seed):
+    """One reach apart, an eighth of the loop, they all stay; nearer, the smaller index of a pair."""
+    rotation = np.random.default_rng(seed).random(3)
+    V, F = polygon([[0, 0], [3, 0], [3, 1], [0, 1]], 1.0)
+    assert len(corners_of(zoo.rotate(V, rotation), F, 100.0)) == 4
+    V, F = polygon([[0, 0], [4, 0], [4, 1], [0, 1]], 1.0)
+    assert corners_of(zoo.rotate(V, rotation), F, 100.0).tolist() == [0, 4]
+
+
 @pytest.mark.parametrize("angle", [30.0, 50.0, 70.0])
 def test_a_number_is_the_smallest_turn(angle):
     """A hexagon turns by 60 degrees, a square by 90."""

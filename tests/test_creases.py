@@ -8,6 +8,8 @@ import pytest
 import zoo
 from structure import built, next_of
 
+from remeshvec._echo import echoes_beside
+from remeshvec._jit import kernel
 from remeshvec._types import NONE
 from remeshvec.creases import find_creases
 
@@ -131,31 +133,102 @@ def test_plates_keep_both_edges(thickness):
     assert found_in(V, F, 0.5)[0] == parts.creases_of(V, F)
 
 
-def strip(heights, columns=12):
-    """Sheet over unit steps along x."""
-    x, y = np.meshgrid(np.arange(len(heights)), np.arange(columns), indexing="ij")
-    z = np.repeat(np.asarray(heights, float)[:, None], columns, axis=1)
-    V = np.stack([x, y, z], axis=-1).reshape(-1, 3)
-    return V, zoo.wrapped_grid(len(heights), columns, False, False)
+# --- folds of a sheet ----------------------------------------------------------------------------
 
 
-def columns_of(found, columns=12):
-    return sorted({a // columns for a, b in found if a // columns == b // columns})
+def sheet(angles, columns=12, noise=0.0):
+    """Sheet of unit squares over a profile: the slope of each piece in degrees."""
+    t = np.radians(angles)
+    x, z = (np.repeat([0, *np.cumsum(part)], columns) for part in (np.cos(t), np.sin(t)))
+    y = np.tile(np.arange(columns), len(t) + 1)
+    V = np.stack([x, y, z], axis=1)
+    V += noise * np.random.default_rng(0).standard_normal(V.shape)
+    return V, zoo.wrapped_grid(len(t) + 1, columns, False, False)
 
 
-def test_a_fold_is_a_crease_and_an_arc_is_none():
-    """The same turns of 40 degrees: once, four times alike, and up and down."""
-    slope = np.tan(np.radians(40))
-    fold = [0, 0, 0, 0, *(slope * np.arange(1, 5))]
-    assert columns_of(found_in(*strip(fold), 1.0)[0]) == [3]
-    angles = np.radians([-60, -60, -60, -20, 20, 60, 60, 60])
-    arc = [0, *np.cumsum(np.sin(angles))]
-    V, F = strip(arc)
-    V[:, 0] = np.repeat([0, *np.cumsum(np.cos(angles))], 12)
-    found, counts = found_in(V, F, 0.9)
-    assert not found and counts["dropped_echo"] == 33
-    step = [0, 0, 0, 0, slope, slope, slope, slope]
-    assert columns_of(found_in(*strip(step), 1.0)[0]) == [3, 4]
+def folds(found, columns=12):
+    """Numbers of the lines across the profile that are creases over half of their length."""
+    along = [a // columns for a, b in found if a // columns == b // columns]
+    assert 4 * (len(found) - len(along)) < len(found) + 1
+    return [k for k in sorted(set(along)) if 2 * along.count(k) > columns]
+
+
+def test_a_turn_that_comes_once_is_a_crease():
+    fold = [0, 0, 0, 40, 40, 40]
+    for noise in (0.0, 0.01, 0.03):
+        assert folds(found_in(*sheet(fold, noise=noise), 1.0)[0]) == [3]
+    assert not found_in(*sheet([0, 0, 0, 20, 20, 20]), 1.0)[0]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.03])
+def test_a_turn_that_comes_three_times_is_an_arc(noise):
+    arc = sheet([-60, -60, -60, -20, 20, 60, 60, 60], noise=noise)
+    found, counts = found_in(*arc, 1.0)
+    assert not found and counts["dropped_echo"] >= 33
+    assert folds(found_in(*arc, 0.6)[0]) == [3, 4, 5], "wide faces at this scale"
+
+
+def test_a_turn_that_comes_twice_is_a_chamfer_where_faces_are_flat():
+    chamfer = [0, 0, 0, 40, 80, 80, 80]
+    assert folds(found_in(*sheet(chamfer), 1.0)[0]) == [3, 4]
+    assert not found_in(*sheet(chamfer, noise=0.02), 1.0)[0]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.02])
+def test_steps_and_ends_of_faces_are_no_echo(noise):
+    """A turn back; and a turn twice as large, which is the end of the face between."""
+    assert folds(found_in(*sheet([0, 0, 0, 40, 0, 0, 0], noise=noise), 1.0)[0]) == [3, 4]
+    assert folds(found_in(*sheet([0, 0, 0, 42, 132, 132], noise=noise), 1.0)[0]) == [3, 4]
+
+
+@kernel
+def listen(X, origin, twin, normals, is_hard, edges, reach, echoes):
+    for k in range(len(edges)):
+        echoes[k] = echoes_beside(X, origin, twin, normals, is_hard, edges[k], reach)[0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_walks_go_straight_over_any_faces(seed):
+    """Between two parallel folds, a unit apart, lies a random triangulation."""
+    from scipy.spatial import Delaunay
+
+    rng = np.random.default_rng(seed)
+    y = np.linspace(0, 3, 16)
+    lines = [np.stack([np.full(16, x), y], axis=1) for x in (-1.0, 0.0, 1.0, 2.0)]
+    P = np.vstack([*lines, rng.random((60, 2)) * [0.9, 2.9] + 0.05])
+    F = Delaunay(P).simplices
+    x = P[:, 0]
+    V = np.column_stack([P, -np.maximum(0, np.maximum(-x, x - 1))])
+    sides = V[np.roll(F, -1, axis=1)] - V[F]
+    F = np.where(np.cross(sides[:, 0], sides[:, 1])[:, 2:] > 0, F, F[:, ::-1])
+    mesh = built(parts.turned(V), F)
+    sides = mesh.X[np.roll(F, -1, axis=1), :3] - mesh.X[F, :3]
+    N = np.cross(sides[:, 0], sides[:, 1])
+    N /= np.linalg.norm(N, axis=1, keepdims=True)
+    end = mesh.origin[[next_of(h) for h in range(mesh.origin.size)]]
+    inward = (x[mesh.origin] == 0) & (x[end] == 0) & (x[F].max(axis=1).repeat(3) > 0)
+    edges = np.flatnonzero(inward)
+    edges = edges[np.abs(P[mesh.origin[edges], 1] - 1.5) < 1]  # away from the border
+    assert len(edges) > 6
+    no_hard = np.zeros(mesh.origin.size, bool)
+    for reach, expected in ((0.999, 0), (1.001, 1)):
+        echoes = np.empty(len(edges))
+        listen(mesh.X, mesh.origin, mesh.twin, N, no_hard, edges, reach, echoes)
+        assert (echoes == expected).all()
+
+
+def test_a_long_fold_may_fade_out():
+    """50 degrees at the border, nothing in the middle: a loose end. A short one is noise."""
+    V, F = zoo.arrays(zoo.grid(13, 13)[0], zoo.wrapped_grid(13, 13, False, False))
+    V += 0.01 * np.random.default_rng(0).standard_normal(V.shape)
+    for reach, expected in ((9.0, range(5, 9)), (4.0, range(1))):
+        fading = np.clip((reach - V[:, 0]) / 4, 0, 1)
+        W = V + np.outer(
+            np.abs(np.arange(169) % 13 - 6) * fading * np.tan(np.radians(25)), [0, 0, 1]
+        )
+        found, _ = found_in(W, F, 1.0)
+        assert all(a % 13 == b % 13 == 6 for a, b in found)
+        assert len(found) in expected
 
 
 # --- nothing to find -----------------------------------------------------------------------------
@@ -203,14 +276,16 @@ def test_a_number_is_the_plain_threshold(name, angle):
     assert found_in(V, F, 0.5, angle)[0] == {edge for edge, turn in turns.items() if turn > angle}
 
 
-def test_equal_turns_fall_on_one_side_of_the_threshold():
+@pytest.mark.parametrize("seed", range(4))
+def test_equal_turns_fall_on_one_side_of_the_threshold(seed):
     """12 sides turn by 30 degrees; the plain threshold is exclusive, the rule inclusive."""
-    for V in (zoo.closed_cylinder(12)[0], parts.turned(zoo.closed_cylinder(12)[0])):
-        F = zoo.closed_cylinder(12)[1]
-        assert len(found_in(V, F, 0.5, 30.0)[0]) == 24
-        assert len(found_in(V, F, 0.5, 29.999)[0]) == 72
-        assert len(found_in(V, F, 0.1)[0]) == 72
-        assert not found_in(*zoo.cube(), 0.5, 90.0)[0]
+    V, F = zoo.closed_cylinder(12)
+    V = zoo.rotate(V, np.random.default_rng(seed).random(3)) + 300.0 * seed
+    assert len(found_in(V, F, 0.5, 30.0)[0]) == 24
+    assert len(found_in(V, F, 0.5, 29.999)[0]) == 72
+    assert len(found_in(V, F, 0.1)[0]) == 72
+    assert not found_in(zoo.rotate(zoo.cube()[0]), zoo.cube()[1], 0.5, 90.0)[0]
+    assert not found_in(zoo.rotate(zoo.grid()[0]), zoo.grid()[1], 0.5, 0.0)[0]
 
 
 def test_none_is_hard_edges_alone():
@@ -230,14 +305,14 @@ def test_hard_edges_stay(angle):
 
 
 def test_what_continues_a_hard_edge_is_kept():
-    """A fold of 27 degrees with noise beside it is weak: alone it goes, after a hard edge it stays."""
-    V, F = strip([0, 0, 0, 0, *(np.tan(np.radians(27)) * np.arange(1, 5))], 3)
+    """A fold of 27 degrees beside noise is weak: alone it goes, after a hard edge it stays."""
+    V, F = sheet([0, 0, 0, 27, 27, 27], 4)
     rng = np.random.default_rng(1)
-    bumps = np.setdiff1d(np.arange(len(V)), np.arange(9, 12))
-    V[bumps, 2] += 0.03 * rng.standard_normal(len(bumps))
-    fold = {(9, 10), (10, 11)}
+    off = np.setdiff1d(np.arange(len(V)), np.arange(12, 16))
+    V[off, 2] += 0.03 * rng.standard_normal(len(off))
+    fold = {(12, 13), (13, 14), (14, 15)}
     assert not found_in(V, F, 1.0)[0] & fold
-    assert found_in(V, F, 1.0, "auto", {(9, 10)})[0] == fold
+    assert found_in(V, F, 1.0, "auto", {(12, 13)})[0] == fold
 
 
 # --- invariance, dirt ----------------------------------------------------------------------------

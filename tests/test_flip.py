@@ -10,13 +10,15 @@ from structure import (
     blocks_of,
     built,
     copied,
+    curve_edges,
+    draw,
     faces_of,
     half_edge,
     one_block,
     shape_of,
 )
 
-from remeshvec._types import NONE, Blocks
+from remeshvec._types import FIXED, FROZEN, NONE, SEAM, Blocks
 from remeshvec.operations.flip import (
     FLIPPED,
     GONE,
@@ -235,6 +237,88 @@ def test_ties_do_not_flip_back_and_forth():
     mesh = built(V, F, ordered=True)
     passes = [flip_edges(mesh, one_block(mesh), STRICT, False)[FLIPPED] for _ in range(12)]
     assert passes[0] > 0 and passes[-1] == 0
+
+
+# --- curves --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("flag", [0, 7, 7 + SEAM, FROZEN])
+def test_edges_on_curves_do_not_flip(flag):
+    """However much it would gain."""
+    V, F = dart(-0.5)
+    mesh = built(V, F)
+    mesh.valence_excess[:] = [10, 10, -10, -10]
+    h = half_edge(mesh, 0, 1)
+    mesh.curve[[h, mesh.twin[h]]] = flag
+    before = copied(mesh)
+    assert not flip_edges(mesh, one_block(mesh), LOOSE, False).any()
+    assert_same_bits(mesh, before)
+    mesh.curve[[h, mesh.twin[h]]] = NONE
+    assert flip_edges(mesh, one_block(mesh), LOOSE, False)[FLIPPED] == 1
+
+
+def test_flags_travel_with_their_edges():
+    """The sides of the quad change their slots, on their other faces they stay where they are."""
+    V, F = zoo.grid(6, 6)
+    a, b = next(
+        e
+        for e in map(sorted, naive.edges(F))
+        if not any(v in edge for v in e for edge in naive.boundary_edges(F))
+    )
+    quad = [f for f in F.tolist() if {a, b} <= set(f)]
+    c, d = (next(v for v in f if v not in (a, b)) for f in quad)
+    for side in ((a, c), (c, b), (b, d), (d, a)):
+        for flag in (7, 7 + SEAM, FROZEN):
+            mesh = built(V, F)
+            alone(mesh, a, b)
+            h = half_edge(mesh, *side)
+            mesh.curve[[h, mesh.twin[h]]] = flag
+            mesh.kind[list(side)] = FIXED
+            before = curve_edges(mesh)
+            assert flip_edges(mesh, one_block(mesh), LOOSE, False)[FLIPPED] == 1
+            assert curve_edges(mesh) == before
+            restore(mesh)
+            assert_valid(mesh)
+            new = half_edge(mesh, c, d)
+            assert mesh.curve[new] == mesh.curve[mesh.twin[new]] == NONE
+
+
+@pytest.mark.parametrize("per_block", [12, 100_000])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_number_of_flips_changes_a_curve(seed, per_block, monkeypatch):
+    """A web of curves over a bad triangulation; the flags are compared as pairs of vertices."""
+    V, F = zoo.planar_delaunay(250, seed)
+    V, F = zoo.perturb(V, F, 0.1, seed)
+    mesh = built(V, F, ordered=True)
+    rng = np.random.default_rng(seed)
+    pairs = [sorted(e) for e in naive.edges(faces_of(mesh))]
+    draw(mesh, *(pairs[k] for k in rng.choice(len(pairs), 120, replace=False)))
+    curves, ends = curve_edges(mesh), mesh.kind.copy()
+    total = 0
+    for _ in range(4):
+        total += flip_edges(mesh, blocks_of(mesh, per_block, monkeypatch), STRICT, False)[FLIPPED]
+        assert curve_edges(mesh) == curves
+        assert_valid(mesh)
+    assert total > 50 and np.array_equal(mesh.kind, ends)
+
+
+def test_sources_stay_in_their_patch():
+    """A flip may move a face of the reference only as far as its neighbour, which is no further curve."""
+    V, F = zoo.grid(9, 9)
+    line = 9 * np.arange(9) + 4
+    mesh = built(V, F)
+    draw(mesh, line.tolist())
+    side = V[F].mean(axis=1)[:, 1] > 4
+    for _ in range(4):
+        alone_on(mesh, np.random.default_rng(0))
+        flip_edges(mesh, one_block(mesh), LOOSE, False)
+        G = mesh.origin.reshape(-1, 3)
+        assert np.array_equal(V[G].mean(axis=1)[:, 1] > 4, side[mesh.source])
+
+
+def alone_on(mesh, rng):
+    """Tell lies about all valences, so that many edges want to flip."""
+    mesh.valence_excess[:] = rng.integers(-2, 6, len(mesh.X))
 
 
 # --- everything at once --------------------------------------------------------------------------

@@ -7,15 +7,22 @@ import nonmanifold
 import numpy as np
 import pytest
 import zoo
-from structure import built, cut_open, featured, next_of
+from structure import built, cut_open, draw, featured, next_of
 
 from remeshvec._jit import kernel
 from remeshvec._types import FIXED, NONE, SEAM
 from remeshvec.curves import count_at_vertices, link_chains
-from remeshvec.polyline import closest_on_curve, find_siblings, join_edges, name_edges
+from remeshvec.polyline import (
+    closest_on_curve,
+    find_siblings,
+    join_edges,
+    measure_arcs,
+    move_on_curve,
+    name_edges,
+)
 
 CREASED = ["cube", "l_prism", "genus_2", "closed_cylinder", "cylinder", "annulus", "grid", "triangle"]
-CUT = ["half_discs", "book", "wall_inside", "two_planes", "three_planes", "four_cubes"]
+CUT = ["half_discs", "two_cubes", "book", "wall_inside", "two_planes", "three_planes", "four_cubes"]
 
 
 def features_of(name):
@@ -186,6 +193,118 @@ def test_without_curves_nobody_has_neighbours():
     names = name_edges(mesh.twin, none, *siblings_of(mesh))
     assert (names == NONE).all()
     assert join_edges(names, links, mesh.origin, np.zeros(len(mesh.X), bool)).shape == (2, 0)
+
+
+# --- arcs ----------------------------------------------------------------------------------------
+
+
+def arcs_of(mesh):
+    """Names, who follows whom, and arc lengths of a mesh with marked features."""
+    is_feature = mesh.curve != NONE
+    names = name_edges(mesh.twin, is_feature, *siblings_of(mesh))
+    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, is_feature)
+    beside = join_edges(names, links, mesh.origin, mesh.kind == FIXED)
+    return np.unique(names[is_feature]), beside, measure_arcs(mesh.X, mesh.origin, names, beside)
+
+
+def chains(edges, beside):
+    """Sets of edges that hang together."""
+    todo = set(edges.tolist())
+    while todo:
+        chain, stack = set(), [todo.pop()]
+        while stack:
+            h = stack.pop()
+            chain.add(h)
+            stack += [int(g) for g in beside[:, h] if g != NONE and int(g) not in chain]
+        todo -= chain
+        yield sorted(chain)
+
+
+@pytest.mark.parametrize("name", CREASED + CUT)
+def test_arcs_go_on_from_edge_to_edge(name):
+    """From zero to the length of the curve, without a jump; closed ones meet their beginning."""
+    mesh, _ = features_of(name)
+    edges, beside, arcs = arcs_of(mesh)
+    assert arcs.shape == (3, mesh.origin.size)
+    assert not np.delete(arcs, edges, axis=1).any()
+    length = {h: naive.edge_length(mesh.X[:, :3], ends(mesh, h)) for h in edges.tolist()}
+    for chain in chains(edges, beside):
+        total = sum(length[h] for h in chain)
+        is_open = (beside[:, chain] == NONE).any()
+        assert arcs[2, chain] == pytest.approx(-total if is_open else total)
+        spans = np.sort(arcs[:2, chain], axis=0)
+        assert spans[1] - spans[0] == pytest.approx([length[h] for h in chain])
+        spans = spans[:, np.argsort(spans[0])]
+        assert spans[0, 0] == 0 and np.array_equal(spans[0, 1:], spans[1, :-1])
+        joints = defaultdict(set)  # arc lengths by place
+        for h in chain:
+            for v, arc in zip(ends(mesh, h), arcs[:2, h], strict=True):
+                joints[(mesh.X[v, :3] + 0.0).tobytes()].add(float(arc))
+        doubled = [found for found in joints.values() if len(found) > 1]
+        assert len(doubled) <= 1 and all(found == {0.0, abs(arcs[2, chain[0]])} for found in doubled)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("k", range(1, 5))
+def test_arcs_over_an_edge_of_no_length(k, seed):
+    """Two vertices of a line in the same place: the line goes on all the same."""
+    V, F = zoo.grid(7, 3, seed)
+    F = F[np.random.default_rng(seed).permutation(len(F))]
+    V[3 * k + 4] = V[3 * k + 1]  # of 1, 4, 7, 10, ... on the middle line
+    mesh = built(V, F)
+    line = np.arange(1, 21, 3)
+    featured(mesh, 1.0, feature_edges=np.stack([line[:-1], line[1:]], axis=1))
+    edges, beside, arcs = arcs_of(mesh)
+    found = {frozenset(ends(mesh, h)): np.sort(arcs[:2, h]).tolist() for h in edges.tolist()}
+    spans = sorted(found[frozenset(edge)] for edge in zip(line[:-1].tolist(), line[1:].tolist(), strict=True))
+    steps = [naive.edge_length(V, edge) for edge in zip(line[:-1], line[1:], strict=True)]
+    assert sorted(high - low for low, high in spans) == pytest.approx(sorted(steps))
+    assert max(high for _, high in spans) == pytest.approx(sum(steps))
+    here = next(h for h in edges.tolist() if set(ends(mesh, h)) == {1, 4})
+    assert len(found) == 16 + 6
+    assert abs(arcs[2, here]) == pytest.approx(sum(steps))
+
+
+def test_arcs_around_a_loop_with_an_edge_of_no_length():
+    for seed in range(20):
+        V, F = zoo.grid(7, 7, seed)
+        F = F[np.random.default_rng(seed).permutation(len(F))]
+        loop = [16, 23, 30, 31, 32, 25, 18, 17, 16]
+        V[30] = V[23]
+        mesh = built(V, F)
+        draw(mesh, loop)
+        edges, beside, arcs = arcs_of(mesh)
+        edges = [h for h in edges.tolist() if set(ends(mesh, h)) <= set(loop)]
+        length = [naive.edge_length(V, ends(mesh, h)) for h in edges]
+        assert abs(arcs[1, edges] - arcs[0, edges]) == pytest.approx(length)
+        assert arcs[2, edges] == pytest.approx(sum(length))
+
+
+@kernel
+def walk(X, origin, beside, arcs, edge, arc, found, parameter):
+    for i in range(len(edge)):
+        found[i], parameter[i] = move_on_curve(X, origin, beside, arcs, edge[i], arc[i])
+
+
+@pytest.mark.parametrize("name", [*CREASED, "half_discs", "two_cubes", "double_bubble"])
+def test_moves_end_at_the_arc_length(name):
+    """From any edge of a curve; past its ends they stop there, around a closed one they go on."""
+    mesh, _ = features_of(name)
+    edges, beside, arcs = arcs_of(mesh)
+    rng = np.random.default_rng(0)
+    start = rng.choice(edges, 300).astype(np.int64)
+    total = np.abs(arcs[2, start])
+    closed = arcs[2, start] > 0
+    wanted = rng.uniform(-0.9, 1.9, 300) * total
+    found, s = np.empty(300, np.int64), np.empty(300)
+    walk(mesh.X, mesh.origin, beside, arcs, start, wanted, found, s)
+    at = arcs[0, found] + s * (arcs[1, found] - arcs[0, found])
+    expected = np.where(closed, wanted % total, np.clip(wanted, 0, total))
+    away = np.abs(at - expected)
+    assert np.where(closed, np.minimum(away, total - away), away).max() < 1e-12
+    assert s.min() >= 0 and s.max() <= 1
+    chain = {h: k for k, one in enumerate(chains(edges, beside)) for h in one}
+    assert [chain[h] for h in found.tolist()] == [chain[h] for h in start.tolist()]
 
 
 # --- closest point -------------------------------------------------------------------------------

@@ -134,7 +134,7 @@ def test_what_is_long_depends_on_the_lengths_at_the_ends():
 @pytest.mark.parametrize("factor", [0.45, 0.9])
 def test_frozen_edges_are_never_split(factor):
     mesh = crossed()
-    frozen = [half_edge(mesh, 8 * i + 1, 8 * i + 2) for i in range(1, 8)]
+    frozen = [half_edge(mesh, 8 * i + 1, 8 * i + 2) for i in (1, 2, 3, 5, 6, 7)]
     frozen += [half_edge(mesh, 8 * 4 + j, 8 * 4 + j + 1) for j in range(3)]  # along a curve
     for h in frozen:
         mesh.curve[h] = FROZEN
@@ -167,7 +167,6 @@ def test_a_low_face_beside_a_frozen_edge_splits_its_longest_other_one():
             mesh.kind[[0, 1]] = FIXED
         refined, count = split_long_edges(mesh, one_block(mesh), 1.0, False)
         assert count == 1
-        assert tuple(refined.X[:, :3].mean(axis=0)) is not None
         middle = V[list(expected)].mean(axis=0)
         assert np.abs(refined.X[:, :3] - middle).sum(axis=1).min() == 0
 

@@ -1,8 +1,10 @@
-"""Untangle: move the vertices of the worst triangles until their smallest angle is acceptable.
+"""Untangle: move the vertices of the worst triangles until these are acceptable.
 
 Relaxation evens out areas, and now and then buys that with a bad triangle. Here only the corners of
-triangles below an angle move, each to where the smallest angle of its one-ring is largest: a pattern
-search in 8 directions of the tangent plane. A move owns the closed one-ring of its vertex.
+such triangles move, each to where the worst of its one-ring is best: a pattern search in 8 directions
+of the tangent plane. The worst has the smallest angle; or else its centroid lies farthest from the
+reference surface, or its circumcircle is the largest for its target length, which says how far from a
+curved surface its points lie at most. A move owns the closed one-ring of its vertex.
 """
 
 from __future__ import annotations
@@ -35,27 +37,36 @@ _DIRECTIONS = np.stack(
 
 
 def untangle_vertices(
-    mesh: Mesh, blocks: Blocks, tree: Tree, on_surface: bool, cosine: float, parallel: bool
+    mesh: Mesh,
+    blocks: Blocks,
+    tree: Tree,
+    on_surface: bool,
+    limit: float,
+    parallel: bool,
+    distance: float = 0.0,
 ) -> int:
-    """Improve rings with an angle below ``acos(cosine)``; returns how many vertices moved.
+    """Improve rings with an angle below ``acos(limit)``; returns how many vertices moved.
 
-    With ``on_surface`` every trial position is the closest point that a walk on the reference surface
+    With a ``distance`` instead those with a face whose centroid is farther than that from the reference
+    surface, or whose squared circumradius exceeds ``limit`` squared target lengths. With ``on_surface`` every trial position is the closest point that a walk on the reference surface
     finds, so that no projection spoils afterwards what was gained.
     """
+    if distance > 0.0:
+        distance = limit / distance**2  # both costs against one limit
     candidates = np.empty(mesh.vertex_halfedge.size, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _find_bad_rings(parallel, mesh, blocks, cosine, candidates, count)
+    _find_bad_rings(parallel, mesh, blocks, tree, limit, distance, candidates, count)
     moved = np.zeros(len(count), np.int64)
     if count.any():
         for stage in stages(blocks):
             _untangle(
-                parallel, mesh, blocks, stage, tree, on_surface, cosine, candidates, count, moved
+                parallel, mesh, blocks, stage, tree, on_surface, limit, distance, candidates, count, moved
             )
     return int(moved.sum())
 
 
 @driver
-def _find_bad_rings(mesh, blocks, cosine, candidates, count):
+def _find_bad_rings(mesh, blocks, tree, limit, distance, candidates, count):
     for k in prange(blocks.vertex.size - 1):
         ring = np.empty((_CAPACITY, 3))
         end = blocks.vertex[k]
@@ -67,14 +78,18 @@ def _find_bad_rings(mesh, blocks, cosine, candidates, count):
             )
             if n > 0:
                 x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
-                if _largest_cosine(ring, n, x, y, z, x, y, z) > cosine:
+                face = np.int64(mesh.birth[v]) // 3
+                # Only a distance makes a ring bad, not a circle alone: the surface may be flat there.
+                if _cost(ring, n, x, y, z, x, y, z, distance, 0.0, tree, face) > limit:
                     candidates[end] = v
                     end += 1
         count[k] = end - blocks.vertex[k]
 
 
 @driver
-def _untangle(mesh, blocks, stage, tree, on_surface, cosine, candidates, count, moved):
+def _untangle(
+    mesh, blocks, stage, tree, on_surface, limit, distance, candidates, count, moved
+):
     for k in prange(stage_blocks(blocks, stage)):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
@@ -89,7 +104,9 @@ def _untangle(mesh, blocks, stage, tree, on_surface, cosine, candidates, count, 
                 )
                 if n > 0:
                     candidates[i] = DONE
-                    moved[k] += _search(mesh.X, mesh.birth, v, ring, n, tree, on_surface, cosine)
+                    moved[k] += _search(
+                        mesh.X, mesh.birth, v, ring, n, tree, on_surface, limit, distance
+                    )
 
 
 @inlined
@@ -113,10 +130,10 @@ def _copy_ring(origin, twin, vertex_halfedge, X, v, low, high, ring):
 
 
 @inlined
-def _largest_cosine(ring, n, x, y, z, x0, y0, z0):
-    """Cosine of the smallest angle around (x, y, z).
+def _cost(ring, n, x, y, z, x0, y0, z0, weight, scale, tree, face):
+    """Cosine of the smallest angle around (x, y, z); with a weight, what `untangle_vertices` says.
 
-    2 where a face has no area or turns by more than 60 degrees against the ring around (x0, y0, z0).
+    1e30 where a face has no area or turns by more than 60 degrees against the ring around (x0, y0, z0).
     Against the vertex normal instead, rings around tips never improve: they have faces on all sides.
     """
     worst = -1.0
@@ -135,7 +152,14 @@ def _largest_cosine(ring, n, x, y, z, x0, y0, z0):
         else:
             cosine = (pp - pq) / sqrt(pp * rr)
         if not cosine < 1.0:
-            return 2.0
+            return 1e30
+        if weight > 0.0:
+            _, _, _, d = walk_to_face(
+                tree, x + (px + qx) / 3.0, y + (py + qy) / 3.0, z + (pz + qz) / 3.0, face
+            )
+            nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+            radius = 0.25 * pp * qq * rr / (nx * nx + ny * ny + nz * nz)
+            cosine = max(weight * d, scale * radius)
         worst = max(worst, cosine)
         if x != x0 or y != y0 or z != z0:
             j = i - 1 if i > 0 else n - 1
@@ -144,15 +168,16 @@ def _largest_cosine(ring, n, x, y, z, x0, y0, z0):
             )
             nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
             if ox * ox + oy * oy + oz * oz > 0.0 and turn_exceeds(ox, oy, oz, nx, ny, nz, 0.5):
-                return 2.0
+                return 1e30
         px, py, pz, pp = qx, qy, qz, qq
     return worst
 
 
 @inlined
-def _search(X, birth, v, ring, n, tree, on_surface, cosine):
+def _search(X, birth, v, ring, n, tree, on_surface, limit, weight):
     """Pattern search; returns 1 if the vertex moved."""
     x, y, z = X[v, 0], X[v, 1], X[v, 2]
+    scale = 1.0 / X[v, 3] ** 2
     nx = ny = nz = length = 0.0
     px, py, pz = ring[n - 1, 0] - x, ring[n - 1, 1] - y, ring[n - 1, 2] - z
     for i in range(n):
@@ -168,11 +193,11 @@ def _search(X, birth, v, ring, n, tree, on_surface, cosine):
         return 0
     sx, sy, sz, tx, ty, tz = tangent_basis(nx / norm, ny / norm, nz / norm)
     face = np.int64(birth[v]) // 3
-    best = _largest_cosine(ring, n, x, y, z, x, y, z)
+    best = _cost(ring, n, x, y, z, x, y, z, weight, scale, tree, face)
     step = _FIRST_STEP
     moved = 0
     for _ in range(_ROUNDS):
-        if best <= cosine or step < _LAST_STEP:
+        if best <= limit or step < _LAST_STEP:
             break
         bx, by, bz, better_face = x, y, z, face
         better = best
@@ -184,7 +209,9 @@ def _search(X, birth, v, ring, n, tree, on_surface, cosine):
             if on_surface:
                 f, s, t, _ = walk_to_face(tree, cx, cy, cz, face)
                 cx, cy, cz = point_on_face(tree.corners, f, s, t)
-            trial = _largest_cosine(ring, n, cx, cy, cz, X[v, 0], X[v, 1], X[v, 2])
+            trial = _cost(
+                ring, n, cx, cy, cz, X[v, 0], X[v, 1], X[v, 2], weight, scale, tree, f
+            )
             if trial < better:
                 bx, by, bz, better_face, better = cx, cy, cz, f, trial
         if better < best:
