@@ -12,6 +12,7 @@ __all__ = [
     "DEAD",
     "FIXED",
     "FROZEN",
+    "HALTED",
     "HELD",
     "INNER",
     "MAX_VALENCE",
@@ -33,6 +34,7 @@ DEAD = -1  # origin of all three half-edges of a removed face
 
 # Edges on feature curves name a half-edge of the reference surface that lies on the same curve.
 FROZEN = -2  # instead of that: the edge stays as it is
+HALTED = -3  # likewise, until the end of the sweep
 SEAM = 1 << 30  # added to that: the edge has siblings on other sheets, which must do what it does
 
 # Kinds of vertices, in the order of what they may do; a collapse keeps the larger kind.

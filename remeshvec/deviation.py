@@ -14,6 +14,7 @@ from ._types import (
     CURVE,
     DEAD,
     FROZEN,
+    HALTED,
     HELD,
     INNER,
     NONE,
@@ -45,7 +46,7 @@ _WITHIN = np.array(
 )
 
 # Samples must keep this share of the distance: between them it may be a little more.
-_SHARE = 0.9
+_SHARE = 0.8
 
 
 def sample_mesh(X: FloatArray, F: IndexArray) -> tuple[FloatArray, IndexArray]:
@@ -80,10 +81,12 @@ class DeviationGuard:
         F = self.reference.origin.reshape(-1, 3)
         self.samples, _ = sample_mesh(self.reference.X, F)
         self.before: Tree | None = None
+        self.held = np.zeros(0, np.bool_)
 
     def remember(self, mesh: Mesh) -> None:
         """Take note of a mesh, compact, before it is changed."""
         self.before = _tree_of(mesh, self.parallel)
+        self.held = np.zeros(len(mesh.X), np.bool_)
 
     def distances(self, mesh: Mesh, trust: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distances of samples: of the mesh from the input, and of the input from the mesh.
@@ -124,10 +127,17 @@ class DeviationGuard:
         for _ in range(rings):
             is_held[F[is_held[F].any(axis=1)]] = True
         _agree_on_seams(mesh, is_held)
-        mesh.kind[is_held & (mesh.kind == INNER)] = HELD
-        mesh.kind[is_held & (mesh.kind == CURVE)] = PINNED
+        inner, on_curve = is_held & (mesh.kind == INNER), is_held & (mesh.kind == CURVE)
+        mesh.kind[inner], mesh.kind[on_curve] = HELD, PINNED
+        self.held[inner | on_curve] = True
         ends = is_held[mesh.origin] & is_held[F[:, [1, 2, 0]].ravel()]
-        mesh.curve[ends & (mesh.curve == NONE)] = FROZEN
+        mesh.curve[ends & (mesh.curve == NONE)] = HALTED
+
+    def release(self, mesh: Mesh) -> None:
+        """Let go of what was held for a sweep, after it."""
+        mesh.kind[self.held & (mesh.kind == HELD)] = INNER
+        mesh.kind[self.held & (mesh.kind == PINNED)] = CURVE
+        mesh.curve[mesh.curve == HALTED] = NONE
 
     def measure(self, mesh: Mesh) -> dict[str, float]:
         """Largest distance of a sample, each way."""

@@ -122,6 +122,8 @@ def set_lengths(
     X[:, 3] = limited_lengths(prepared, lengths, gradation)
     expected = expected_faces(X, prepared.mesh.origin, X[:, 3])
     _check_output(prepared, measures, expected, max_faces)
+    if X[:, 3].max() == X[:, 3].min():
+        return float(X[0, 3])
     return sqrt(measures.area / (expected * _FACE))
 
 

@@ -126,7 +126,10 @@ def _measure_arcs(X, origin, beside, seeds, arcs):
             after = np.int64(beside[1 - end, h])
             if after == NONE or after == seed:
                 break
-            end = 0 if _shares(X, origin[after], b if end == 0 else a) else 1
+            if beside[0, after] != beside[1, after]:
+                end = 0 if beside[0, after] == h else 1
+            else:  # two edges between the same ends
+                end = 0 if _shares(X, origin[after], b if end == 0 else a) else 1
             h = after
         for i in range(count):
             arcs[2, path[i]] = -total if is_open else total

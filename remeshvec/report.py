@@ -74,7 +74,7 @@ class Report:
     deviation : dict
         With ``max_deviation``, the largest distance found: "to_input" from samples of the result (ten a
         face: its corners, the middles of its edges, four points inside) to the input, and "from_input"
-        from such samples of the input to the result. No sample may exceed 0.9 times the bound; what
+        from such samples of the input to the result. No sample may exceed 0.8 times the bound; what
         lies between samples is not looked at.
     """
 

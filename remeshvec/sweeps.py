@@ -185,9 +185,11 @@ class Sweeps:
             with self.watch.time("deviation"):
                 offenders = self.guard.offenders(trial)
                 if not len(offenders):
+                    self.guard.release(trial)
                     return trial, result
                 self.guard.hold(mesh, offenders, attempt)
-        self.counts[-1] = counts
+        self.guard.release(mesh)
+        self.counts[-1] = counts | {"collapse": 0, "flip": 0}
         return mesh, np.inf
 
     def _change(

@@ -5,10 +5,11 @@ import naive
 import numpy as np
 import pytest
 import zoo
-from structure import built, faces_of, tree_of
+from structure import built, faces_of, referenced, tree_of
 
 from remeshvec._jit import kernel
-from remeshvec.bvh import STACK, closest_face
+from remeshvec._types import NONE
+from remeshvec.bvh import STACK, closest_face, closest_faces, search_face
 
 RNG = np.random.default_rng(11)
 
@@ -34,9 +35,9 @@ def closest(mesh, P, hints=None, trust=0.0):
     return faces, a + s * (b - a) + t * (c - a), np.sqrt(squared)
 
 
-def truth(mesh, P):
+def truth(mesh, P, faces=slice(None)):
     """Distances and points by libigl."""
-    V, F = mesh.X[:, :3].copy(), faces_of(mesh).astype(np.int64)
+    V, F = mesh.X[:, :3].copy(), faces_of(mesh)[faces].astype(np.int64)
     squared, _, points = igl.point_mesh_squared_distance(P, V, F)
     return np.sqrt(squared), points
 
@@ -137,3 +138,111 @@ def test_parallel_is_the_same():
     mesh = built(*zoo.icosphere(3), ordered=True)
     for one, two in zip(tree_of(mesh), tree_of(mesh, True), strict=True):
         assert one.tobytes() == two.tobytes()
+
+
+# --- patches -------------------------------------------------------------------------------------
+
+
+def near(mesh, count=200, scale=0.7):
+    """Points around a mesh."""
+    size = np.ptp(mesh.X[:, :3], axis=0).max()
+    return mesh.X[:, :3].mean(axis=0) + scale * size * RNG.normal(size=(count, 3))
+
+
+@pytest.mark.parametrize("name", ["cube", "genus_2", "closed_cylinder", "two_components"])
+def test_search_and_walk_stay_in_the_patch_of_the_hint(name):
+    mesh = built(*zoo.upsampled(*zoo.ZOO[name].make(), n=1, noise=0.0), ordered=True)
+    tree = referenced(mesh, 1.0, feature_angle=40.0).tree
+    assert tree.patch.max() > 0
+    P = near(mesh)
+    hints = RNG.integers(len(tree.patch), size=len(P))
+    for trust in (0.0, np.inf):
+        faces, weights, squared = np.empty(len(P), int), np.empty((len(P), 2)), np.empty(len(P))
+        query(tree, P, hints, trust, faces, weights, squared)
+        assert np.array_equal(tree.patch[faces], tree.patch[hints])
+        for k in range(tree.patch.max() + 1):
+            mine = tree.patch[hints] == k
+            expected = truth(mesh, P[mine], tree.patch == k)[0]
+            assert (np.sqrt(squared[mine]) >= expected * (1 - 1e-9)).all()
+            if trust == 0.0:
+                assert np.sqrt(squared[mine]) == pytest.approx(expected, rel=1e-9)
+
+
+@kernel
+def search(tree, P, start, N, faces, squared):
+    stack = np.empty((2, STACK), np.int64)
+    for i in range(len(P)):
+        faces[i], _, _, squared[i] = search_face(
+            tree, P[i, 0], P[i, 1], P[i, 2], start[i], N[i, 0], N[i, 1], N[i, 2], stack
+        )
+
+
+@pytest.mark.parametrize("name", ["torus", "thin_sheet", "genus_3", "bipyramid"])
+def test_a_search_with_a_normal_skips_faces_that_look_away(name):
+    """All but the one where it starts, which may look anywhere."""
+    mesh = built(*zoo.ZOO[name].make(), ordered=True)
+    V, F = mesh.X[:, :3], faces_of(mesh)
+    P, N = near(mesh, 150), RNG.normal(size=(150, 3))
+    start = RNG.integers(len(F), size=len(P))
+    faces, squared = np.empty(len(P), int), np.empty(len(P))
+    search(tree_of(mesh), P, start, N, faces, squared)
+    vectors = np.array([naive.normal(V, f) for f in F])
+    for i, (p, n) in enumerate(zip(P, N, strict=True)):
+        allowed = vectors @ n >= 0
+        allowed[start[i]] = True
+        assert allowed[faces[i]]
+        expected = truth(mesh, P[i : i + 1], allowed)[0]
+        assert np.sqrt(squared[i]) == pytest.approx(expected[0], rel=1e-9), p
+
+
+def test_a_search_without_a_normal_sees_all():
+    mesh = built(*zoo.torus(), ordered=True)
+    P = near(mesh)
+    faces, squared = np.empty(len(P), int), np.empty(len(P))
+    search(tree_of(mesh), P, np.zeros(len(P), np.int64), np.zeros((len(P), 3)), faces, squared)
+    assert np.sqrt(squared) == pytest.approx(truth(mesh, P)[0], rel=1e-9)
+
+
+# --- many points ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [1, 255, 256, 257, 1500])
+@pytest.mark.parametrize("hinted", [False, True])
+def test_many_points(count, hinted):
+    mesh = built(*zoo.genus_3(), ordered=True)
+    P = near(mesh, count)
+    hint = np.full(count, NONE, np.int32)
+    if hinted:
+        hint = RNG.integers(len(faces_of(mesh)), size=count).astype(np.int32)
+    faces, distance = closest_faces(tree_of(mesh), P, hint, 0.0, False)
+    assert faces.dtype == np.int32 and faces.shape == distance.shape == (count,)
+    assert distance == pytest.approx(truth(mesh, P)[0], rel=1e-9)
+    corners = mesh.X[faces_of(mesh)[faces], :3]
+    there = [naive.closest_on_triangle(p, *T)[1] for p, T in zip(P, corners, strict=True)]
+    assert distance == pytest.approx(there, rel=1e-9)
+    for one, two in zip((faces, distance), closest_faces(tree_of(mesh), P, hint, 0.0, True), strict=True):
+        assert one.tobytes() == two.tobytes()
+
+
+def test_many_points_within_trust_are_not_searched():
+    """An upper bound within the trust, else exact."""
+    mesh = built(*zoo.upsampled(*zoo.thin_sheet(8, 0.3), n=0, noise=0.2), ordered=True)
+    P = near(mesh, 400, 0.3)
+    hint = RNG.integers(len(faces_of(mesh)), size=len(P)).astype(np.int32)
+    _, distance = closest_faces(tree_of(mesh), P, hint, 1.0, False)
+    expected = truth(mesh, P)[0]
+    assert (distance >= expected * (1 - 1e-9)).all()
+    far = distance > 1.0
+    assert far.any() and distance[far] == pytest.approx(expected[far], rel=1e-9)
+
+
+def test_many_points_stay_in_the_patch_of_their_hint():
+    mesh = built(*zoo.upsampled(*zoo.cube(), n=2, noise=0.0), ordered=True)
+    tree = referenced(mesh, 1.0, feature_angle=40.0).tree
+    P = near(mesh)
+    hint = RNG.integers(len(tree.patch), size=len(P)).astype(np.int32)
+    faces, distance = closest_faces(tree, P, hint, 0.0, False)
+    assert np.array_equal(tree.patch[faces], tree.patch[hint])
+    for k in range(6):
+        mine = tree.patch[hint] == k
+        assert distance[mine] == pytest.approx(truth(mesh, P[mine], tree.patch == k)[0], rel=1e-9)

@@ -357,8 +357,8 @@ def _close_face(mesh, h, tn, tp):
     p = previous(h)
     apex = mesh.origin[p]
     curve = max(mesh.curve[following(h)], mesh.curve[p])
-    if mesh.curve[following(h)] == FROZEN or mesh.curve[p] == FROZEN:
-        curve = np.int32(FROZEN)
+    if min(mesh.curve[following(h)], mesh.curve[p]) <= FROZEN:
+        curve = min(mesh.curve[following(h)], mesh.curve[p])
     if tn != NONE:
         mesh.twin[tn] = tp
         mesh.curve[tn] = curve

@@ -200,7 +200,7 @@ def _long_edges(mesh, f, half_factor):
     if mask == 0:
         return mask
     for i in range(3):
-        if mesh.curve[3 * f + i] == FROZEN:
+        if mesh.curve[3 * f + i] <= FROZEN:
             mask &= ~(1 << i)
     if mask == 0 or mask == 1 or mask == 2 or mask == 4:
         return mask
