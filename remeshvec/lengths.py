@@ -34,7 +34,7 @@ _FACE = sqrt(3.0) / 4.0
 _ADAPTIVE_SHARE = 0.9
 
 # Where no face may exceed the distance even on the way.
-_DEVIATION_SHARE = 0.6
+_DEVIATION_SHARE = 0.5
 
 
 class Measures(NamedTuple):

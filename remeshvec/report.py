@@ -72,10 +72,10 @@ class Report:
         Creases of the input that are kept: "crease_edges", "chains", "corners", and how many edges the
         rule of ``feature_angle="auto"`` dropped: "dropped_echo", "dropped_noise", "dropped_short".
     deviation : dict
-        With ``max_deviation``, the largest distance found: "to_input" from samples of the result (ten a
-        face: its corners, the middles of its edges, four points inside) to the input, and "from_input"
-        from such samples of the input to the result. No sample may exceed 0.8 times the bound; what
-        lies between samples is not looked at.
+        With ``max_deviation`` or an adaptive length, the largest distance found: "to_input" from
+        samples of the result (21 a face, on a grid) to the input, and "from_input" from such samples of
+        the input to the result. With ``max_deviation`` no sample exceeds 0.8 times the bound; what lies
+        between samples is not looked at.
     """
 
     target_length: float

@@ -64,8 +64,8 @@ _GRADATION_ROUNDS = 32
 # Faces made for a tolerance are moved until their centroids, which are not where they are worst, and
 # split until their samples keep these shares of it. Where more than this share of all faces would be
 # split, the input is rougher than the tolerance, and splits would follow its own faces.
-_CENTROID_SHARE = 0.88
-_SAMPLE_SHARE = 0.985
+_CENTROID_SHARE = 0.84
+_SAMPLE_SHARE = 1.0
 _ROUGH = 0.05
 
 # Sweeps, counted from the last one as 1, after which lengths are compared with what they led to.
@@ -73,7 +73,7 @@ _FEEDBACK = (7, 5, 3)
 
 # Rounds of moves that make the largest faces smaller; then of splits where chords are still too long,
 # each of which takes a quarter off the error.
-_EVENING_ROUNDS = 8
+_EVENING_ROUNDS = 20
 _REFINEMENTS = 3
 
 # So many sweeps that split and collapse about as many edges, and below this share of all, go in circles.

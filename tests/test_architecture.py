@@ -47,7 +47,7 @@ SIDEWAYS = {
     *(("remesh", name) for name in (
         "options", "constraints", "prepare", "lengths", "reference", "sweeps", "extract", "report",
     )),
-    ("_ply_guard", "_file_guards"), ("_file_guards", "_ply_guard"), ("_mesh_writers", "_file_guards"),
+    ("_ply_guard", "_file_guards"), ("_mesh_writers", "_file_guards"),
     ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
     ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"),
 }  # fmt: skip

@@ -5,17 +5,31 @@ import pytest
 import zoo
 from hypothesis import example, given
 from hypothesis import strategies as st
-from structure import assert_valid, faces_of, locate, project, shape_of
+from structure import (
+    assert_on_reference,
+    assert_valid,
+    faces_of,
+    featured,
+    locate,
+    next_of,
+    project,
+    shape_of,
+)
 
 from remeshvec import remesh
+from remeshvec._types import DEAD, FIXED, SEAM
 from remeshvec.edge_sets import make_blocks
-from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
+from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges, collapse_siblings
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.flip import FlipLimits, flip_edges
-from remeshvec.operations.relax import RelaxOptions, relax_vertices
+from remeshvec.operations.project import read_lengths
+from remeshvec.operations.relax import relax_vertices
+from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
+from remeshvec.operations.unfold import undo_folds
 from remeshvec.operations.untangle import untangle_vertices
-from remeshvec.prepare import build_reference, prepare
+from remeshvec.polyline import find_siblings
+from remeshvec.prepare import prepare
 
 MESHES = st.fixed_dictionaries(
     {
@@ -40,41 +54,100 @@ OPTIONS = st.fixed_dictionaries(
         "per_block": st.sampled_from([5, 24, 100, 10**6]),
     }
 )
+CONTROLS = st.fixed_dictionaries(
+    {
+        "varies": st.booleans(),
+        "feature_angle": st.sampled_from([None, "auto", 20.0, 50.0]),
+        "boundary": st.sampled_from(["free", "split", "fixed"]),
+        "share": st.sampled_from([0.0, 0.02, 0.1]),
+        "seed": st.integers(0, 1000),
+    },
+    optional={
+        "feature_edges": st.just(True),
+        "fixed_vertices": st.just(True),
+        "fixed_faces": st.just(True),
+        "face_labels": st.just(True),
+    },
+)
+PLAIN = {"varies": False, "feature_angle": None, "boundary": "free", "share": 0.0, "seed": 0}
 
 
 def cosine(degrees):
     return float(np.cos(np.radians(degrees)))
 
 
+def wishes(F, controls):
+    """Random parts of a mesh to be kept, as keywords; a share of each kind."""
+    rng = np.random.default_rng(controls["seed"])
+    some = lambda n: rng.choice(n, round(controls["share"] * n), replace=False)  # noqa: E731
+    edges = np.unique(np.sort(np.vstack([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1), axis=0)
+    kept = {
+        "feature_edges": edges[some(len(edges))],
+        "fixed_vertices": np.unique(F)[some(len(np.unique(F)))],
+        "fixed_faces": some(len(F)),
+        "face_labels": rng.integers(2, size=len(F)) if controls["share"] else np.zeros(len(F), int),
+    }
+    kept = {name: value for name, value in kept.items() if name in controls}
+    return {name: controls[name] for name in ("feature_angle", "boundary")} | kept
+
+
 class Phases:
     """The phases in the order of a sweep, with all arrays checked after each."""
 
-    def __init__(self, V, F, length, options, patch):
+    def __init__(self, V, F, length, options, controls, patch):
         patch.setattr("remeshvec.edge_sets.FACES_PER_BLOCK", options["per_block"])
         prepared = prepare(V, F, False)
-        self.o, self.length = options, length * prepared.scale
+        self.o = options
+        self.mesh = mesh = prepared.mesh
         self.slits = bool(prepared.dirt.keys() & {"non_manifold_edges", "inconsistent_edges"})
-        self.mesh = prepared.mesh
-        self.reference = build_reference(self.mesh, self.length, False)
-        self.shape = None if self.slits else shape_of(faces_of(self.mesh))
+        mesh.X[:, 3] = length * prepared.scale
+        if controls["varies"]:
+            mesh.X[:, 3] *= 1 + 0.4 * np.sin(3 * mesh.X[:, 0] + mesh.X[:, 1])
+        source = prepared.vertex_source
+        wanted = wishes(source[mesh.origin.reshape(-1, 3)].astype(np.int64), controls)
+        self.built = featured(mesh, vertex_source=source, **wanted)
+        self.reference = self.built.reference
+        self.shape = None if self.slits else shape_of(faces_of(mesh))
+        self.corners = held(mesh)
+        self.sheets = set(self.seams().values())
         self.check("prepare")
 
     def check(self, phase):
         self.blocks = make_blocks(self.mesh)
         try:
             assert_valid(self.mesh, slits=self.slits)
+            assert_on_reference(self.mesh, self.reference)
             if not self.slits:
                 assert shape_of(faces_of(self.mesh)) == self.shape
+            assert held(self.mesh) == self.corners, "a fixed vertex moved or went"
+            assert set(self.seams().values()) <= self.sheets, "a seam came open"
             size = len(self.reference.origin)
             used = self.mesh.vertex_halfedge >= 0
             assert self.mesh.birth[used].min() >= 0 and self.mesh.birth[used].max() < size
         except AssertionError as error:
             raise AssertionError(f"after {phase}: {error}") from error
 
+    def seams(self):
+        """Number of sheets at every edge on a seam, by its place."""
+        found = {}
+        for h in self.on_seams().tolist():
+            ends = self.mesh.origin[[h, next_of(h)]]
+            edge = frozenset((self.mesh.X[v, :3] + 0.0).tobytes() for v in ends)
+            found[edge] = found.get(edge, 0) + 1
+        return found
+
+    def on_seams(self):
+        alive = self.mesh.origin != DEAD
+        return np.flatnonzero((self.mesh.curve >= SEAM) & alive).astype(np.int32)
+
+    def siblings(self):
+        return find_siblings(self.mesh.X, self.mesh.origin, self.on_seams())
+
     def split(self):
         for _ in range(12):
+            siblings = self.siblings() if self.slits else None
             self.mesh, count = split_long_edges(
-                self.mesh, self.blocks, self.o["split"] * self.length, False
+                self.mesh, self.blocks, self.o["split"], False, siblings
             )
             self.check("split")
             if not count:
@@ -83,14 +156,13 @@ class Phases:
     def collapse(self):
         o = self.o
         limits = CollapseLimits(
-            o["collapse"] * self.length,
-            o["split"] * self.length,
-            cosine(o["foldover"]),
-            o["quadric_reach"] * self.length,
-            o["sliver_check"],
+            o["collapse"], o["split"], cosine(o["foldover"]), o["quadric_reach"], o["sliver_check"]
         )
         collapse_short_edges(self.mesh, self.blocks, limits, False)
         self.check("collapse")
+        if self.slits:
+            collapse_siblings(self.mesh, *self.siblings(), limits)
+            self.check("collapse of siblings")
 
     def flip(self):
         o = self.o
@@ -100,13 +172,18 @@ class Phases:
             self.check("flip")
 
     def relax(self):
-        o = self.o
-        options = RelaxOptions(o["stiffness"], o["project"])
-        relax_vertices(self.mesh, self.blocks, options, False)
+        before = self.mesh.X.copy()
+        slide_vertices(self.mesh, self.blocks, self.reference, False)
+        self.check("slide")
+        relax_vertices(self.mesh, self.blocks, self.o["stiffness"], False)
         self.check("relax")
-        if o["project"]:
+        if self.o["project"]:
             project(self.mesh, self.reference, self.blocks)
             self.check("project")
+        undo_folds(self.mesh, self.blocks, before, False)
+        self.check("unfold")
+        read_lengths(self.mesh, self.blocks, self.reference, False)
+        self.check("read lengths")
 
     def finish(self):
         self.mesh = compact(self.mesh, self.blocks, False)
@@ -115,19 +192,25 @@ class Phases:
         untangle_vertices(self.mesh, self.blocks, tree, self.o["project"], cosine(42), False)
         self.check("untangle")
         if self.o["fit"]:
-            fit_vertices(self.mesh, self.blocks, tree, 0.2 * self.length, False)
+            fit_vertices(self.mesh, self.blocks, tree, 0.2, False)
             self.check("fit")
         weights = locate(self.mesh, self.reference, self.blocks)
         self.check("locate")
         assert weights.min() >= -1e-12 and weights.sum(axis=1) == pytest.approx(1)
 
 
-def run(mesh, options, sweeps=2):
+def held(mesh):
+    """Fixed vertices: where they lie and where they were born, bit for bit."""
+    fixed = np.flatnonzero((mesh.kind == FIXED) & (mesh.vertex_halfedge != DEAD))
+    return sorted((mesh.X[v, :3].tobytes(), int(mesh.birth[v])) for v in fixed)
+
+
+def run(mesh, options, controls=PLAIN, sweeps=2):
     V, F = zoo.ZOO[mesh["name"]].make()
     length = mesh["factor"] * zoo.mean_edge(V, F)
     V, F = zoo.perturb(V, F, mesh["amount"], mesh["seed"])
     with pytest.MonkeyPatch.context() as patch:
-        phases = Phases(V, F, length, options, patch)
+        phases = Phases(V, F, length, options, controls, patch)
         for _ in range(sweeps):
             phases.split()
             phases.collapse()
@@ -141,15 +224,22 @@ def test_every_phase_keeps_the_mesh_valid(mesh, options):
     run(mesh, options)
 
 
-@pytest.mark.parametrize("name", zoo.TIDY)
-def test_every_shape_through_every_phase(name):
+@given(MESHES, OPTIONS, CONTROLS)
+def test_every_phase_keeps_curves_and_what_is_held(mesh, options, controls):
+    run(mesh, options, controls)
+
+
+@pytest.mark.parametrize("angle", [None, 40.0])
+@pytest.mark.parametrize("name", [*zoo.TIDY, *zoo.DIRTY])
+def test_every_shape_through_every_phase(name, angle):
     """The whole zoo, in many blocks, badly shaken."""
     options = {
         "split": 4 / 3, "collapse": 0.8, "foldover": 60.0, "quadric_reach": 0.5, "sliver_check": False,
         "flip_normal": 60.0, "delaunay_ties": True, "stiffness": 20.0,
         "project": True, "fit": True, "per_block": 24,
     }  # fmt: skip
-    run({"name": name, "amount": 0.15, "seed": 1, "factor": 0.8}, options)
+    mesh = {"name": name, "amount": 0.15, "seed": 1, "factor": 0.8}
+    run(mesh, options, {**PLAIN, "feature_angle": angle, "varies": angle is not None})
 
 
 CALLS = st.fixed_dictionaries(
@@ -165,8 +255,29 @@ CALLS = st.fixed_dictionaries(
         "untangle_angle": st.floats(1.0, 60.0),
         "fit": st.booleans(),
         "threads": st.integers(1, 3),
+        "feature_angle": st.sampled_from(["auto", None, 30]),
+        "boundary": st.sampled_from(["free", "split", "fixed"]),
+        "gradation": st.floats(1.1, 3.0),
+        "tol": st.floats(0.0, 0.3),
     },
 )
+
+
+def sheets(F):
+    """Number of faces at the edges that have more than two."""
+    return {len(users) for users in zoo.edge_faces(F).values()} - {1, 2}
+
+
+def assert_proper(result, F):
+    """Whole faces, each once; edges of three faces and more where the input has such, and no others."""
+    shape = shape_of(result.F)
+    assert np.isfinite(result.V).all()
+    assert shape["proper"] and shape["duplicate faces"] == 0
+    assert zoo.unreferenced(result.V, result.F) == 0
+    once = list({frozenset(f): f for f in zoo.proper(F)}.values())
+    assert sheets(result.F) == sheets(once)
+    if not sheets(once) and "inconsistent_edges" not in result.report.dirt:
+        assert shape["oriented"] and shape["manifold"]
 
 
 @given(MESHES, CALLS)
@@ -176,14 +287,43 @@ def test_every_call_returns_a_proper_mesh(mesh, call):
     length = mesh["factor"] * zoo.mean_edge(V, F)
     V, F = zoo.perturb(V, F, mesh["amount"], mesh["seed"])
     result = remesh(V, F, length, **call)
-    assert np.isfinite(result.V).all()
-    shape = shape_of(result.F)
-    assert shape["oriented"] and shape["manifold"] and shape["proper"]
-    assert zoo.unreferenced(result.V, result.F) == 0
+    assert_proper(result, F)
     if zoo.ZOO[mesh["name"]].is_tidy:
-        assert shape == shape_of(F)
+        assert shape_of(result.F) == shape_of(F)
     again = remesh(V, F, length, **call)
     assert again.V.tobytes() == result.V.tobytes() and np.array_equal(again.F, result.F)
+
+
+@given(MESHES, CONTROLS)
+def test_every_controlled_call_returns_a_proper_mesh(mesh, controls):
+    """With parts of all kinds that are to be kept, and a length at every vertex."""
+    V, F = zoo.ZOO[mesh["name"]].make()
+    L = mesh["factor"] * zoo.mean_edge(V, F)
+    V, F = zoo.perturb(V, F, mesh["amount"], mesh["seed"])
+    used = np.array(zoo.proper(F))
+    kept = wishes(used, controls)
+    for name in ("fixed_faces", "face_labels"):  # in terms of the faces that are whole
+        if name in kept and len(used) < len(F):
+            del kept[name]
+    if controls["varies"]:
+        L = L * (1 + 0.5 * np.sin(3 * V[:, 0] + V[:, 1]))
+    result = remesh(V, F, L, **kept)
+    assert_proper(result, F)
+    if zoo.ZOO[mesh["name"]].is_tidy:
+        assert shape_of(result.F) == shape_of(F)
+    claimed = np.flatnonzero(result.vertex_map >= 0)
+    assert np.array_equal(result.V[result.vertex_map[claimed]], V[claimed])
+    if "fixed_vertices" in kept:
+        assert (result.vertex_map[kept["fixed_vertices"]] >= 0).all()
+    if "fixed_faces" in kept and zoo.ZOO[mesh["name"]].is_tidy:
+        assert (result.face_map[kept["fixed_faces"]] >= 0).all()
+
+
+def soup(seed):
+    """Twelve random faces over seven vertices."""
+    rng = np.random.default_rng(seed)
+    F = rng.integers(0, 7, size=(12, 3))
+    return rng.normal(size=(7, 3)), F
 
 
 @st.composite
@@ -198,13 +338,13 @@ def soups(draw):
 
 
 @given(soups(), st.sampled_from([0.3, 1.0, 5.0]))
+@example(soup(10), 1.0)
+@example(soup(0), 0.3)
 def test_any_soup_becomes_a_proper_mesh(soup, L):
     V, F = soup
     if all(len(set(f)) < 3 for f in F.tolist()):
         return
     result = remesh(V, F, L, iterations=3)
-    shape = shape_of(result.F)
-    assert shape["oriented"] and shape["manifold"] and shape["proper"], shape
-    assert np.isfinite(result.V).all()
+    assert_proper(result, F)
     kept = {frozenset(f) for f in F.tolist() if len(set(f)) == 3}
     assert zoo.components(result.F) <= len(kept)
