@@ -96,7 +96,7 @@ def selection() -> Picture:
     is_new[result.face_map[~chosen]] = False
     panels = [
         Panel("selection", V, F, by_label(np.where(chosen, 1, -1)), borders(F, chosen)),
-        _panel("remeshed", result, by_label(np.where(is_new, 1, -1)), borders(result.F, is_new)),
+        Panel("remeshed", *result, by_label(np.where(is_new, 1, -1)), borders(result.F, is_new)),
     ]
     return Picture(panels, view=(20.0, 15.0), columns=2)
 

@@ -86,6 +86,10 @@ class Mesh(NamedTuple):
     kind: NDArray[np.uint8]
     birth: IndexArray
 
+    def copy(self) -> Mesh:
+        """Return the mesh in arrays of its own: phases change theirs."""
+        return Mesh(*(array.copy() for array in self))  # type: ignore[arg-type]
+
 
 class Blocks(NamedTuple):
     """Ranges of faces and of vertices that lie together in space (both (k + 1,) int64)."""

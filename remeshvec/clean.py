@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +27,7 @@ def drop_duplicate_faces(F: Faces) -> Indices | None:
     return np.sort(first) if len(first) < len(F) else None
 
 
-def weld_vertices(V: FloatArray, candidates: Indices) -> NDArray[np.int32] | None:
+def weld_vertices(V: FloatArray, candidates: NDArray[Any]) -> NDArray[np.int32] | None:
     """Map candidates with the same coordinates to one of them; None where all differ.
 
     Returns

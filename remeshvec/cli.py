@@ -114,9 +114,9 @@ def _check_outputs(options: argparse.Namespace) -> None:
     named = [options.output, options.save_stats, options.save_arrays, options.picture]
     paths = [Path(name).resolve() for name in named if name]
     if len(set(paths)) < len(paths):
-        raise OptionError("the output, the statistics, the arrays and the picture need names of their own")
+        raise OptionError("all files to be written need names of their own")
     if Path(options.input).resolve() in paths[bool(options.output) :]:
-        raise OptionError(f"the statistics, the arrays or the picture would replace {options.input}")
+        raise OptionError(f"what is written beside the mesh would replace {options.input}")
 
 
 def _length(options: argparse.Namespace, mesh: MeshFile) -> Any:

@@ -61,7 +61,7 @@ class Constraints:
             edges, vertices = same[edges].astype(np.int64), same[vertices]
         hard = np.zeros(len(keys), np.bool_)
         if len(edges):
-            hard |= np.isin(keys, _edge_keys(*edges.T, n))
+            hard |= np.isin(keys, _edge_keys(edges[:, 0], edges[:, 1], n))
         if self.labels is not None:
             hard |= _borders(mesh.twin, self.labels[face_source])
         fixed = np.zeros(max(n, int(vertices.max(initial=0)) + 1), np.bool_)
@@ -190,7 +190,7 @@ def _edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:
         )
     edges = _indices(array.ravel(), n, "feature_edges", "vertex").reshape(-1, 2)
     known = _edge_keys(F.ravel(), np.roll(F, -1, axis=1).ravel(), n)
-    bad = np.flatnonzero(~np.isin(_edge_keys(*edges.T, n), known))
+    bad = np.flatnonzero(~np.isin(_edge_keys(edges[:, 0], edges[:, 1], n), known))
     if len(bad):
         a, b = edges[bad[0]]
         raise OptionError(

@@ -103,7 +103,7 @@ class DeviationGuard:
         return points, to_input, from_input
 
     def offenders(self, mesh: Mesh) -> FloatArray:
-        """Samples of either surface that lie too far from the other, (k, 3)."""
+        """Return the samples of either surface that lie too far from the other, (k, 3)."""
         limit = _SHARE * self.distance
         points, to_input, from_input = self.distances(mesh, limit)
         return np.concatenate([points[to_input > limit], self.samples[from_input > limit]])
@@ -137,9 +137,7 @@ class DeviationGuard:
         return {"to_input": float(to_input.max()), "from_input": float(from_input.max())}
 
 
-def _worst_distances(
-    mesh: Mesh, built: Built, trust: float, parallel: bool
-) -> FloatArray:
+def _worst_distances(mesh: Mesh, built: Built, trust: float, parallel: bool) -> FloatArray:
     """Largest distance of a sample of each face of a compact mesh from the input."""
     F = mesh.origin.reshape(-1, 3)
     points, face = sample_mesh(mesh.X, F)
@@ -148,9 +146,7 @@ def _worst_distances(
     return distance.reshape(len(F), -1).max(axis=1)
 
 
-def shortened_lengths(
-    mesh: Mesh, built: Built, tolerance: float, parallel: bool
-) -> FloatArray:
+def shortened_lengths(mesh: Mesh, built: Built, tolerance: float, parallel: bool) -> FloatArray:
     """Target lengths at the vertices of the input, shorter where faces are off by more than a tolerance.
 
     The error goes with the square of the length; a length falls by no more than 0.7 at a time.
@@ -163,9 +159,7 @@ def shortened_lengths(
     return np.asarray(X[:, 3] * np.maximum(np.sqrt(share), 0.7))
 
 
-def edges_to_refine(
-    mesh: Mesh, built: Built, tolerance: float, parallel: bool
-) -> IndexArray:
+def edges_to_refine(mesh: Mesh, built: Built, tolerance: float, parallel: bool) -> IndexArray:
     """Longest edge of every face with a sample farther than ``tolerance`` from the input.
 
     Only where it is longer than its target: shorter ones follow ridges of the input's own faces, which

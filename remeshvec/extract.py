@@ -13,7 +13,7 @@ from .clean import weld_vertices
 from .constraints import Constraints
 from .prepare import Prepared
 from .reference import Built
-from .sweeps import seam_vertices
+from .seams import seam_vertices
 
 __all__ = ["Output", "extract"]
 

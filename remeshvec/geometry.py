@@ -55,8 +55,9 @@ def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):
 
 @inlined
 def is_flat(nx, ny, nz, longest_squared):
-    """Tell whether a face is lower than 1e-5 of its longest side, from its vector: three points of a
-    straight line but for rounding.
+    """Tell from its vector whether a face is lower than 1e-5 of its longest side.
+
+    Three points of a straight line are, but for rounding.
     """
     limit = 1e-5 * longest_squared
     return nx * nx + ny * ny + nz * nz < limit * limit

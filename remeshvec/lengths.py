@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._jit import kernel
-from ._types import FloatArray
+from ._types import DEAD, FROZEN, FloatArray, Mesh
 from .constraints import Marks
 from .creases import find_creases
 from .errors import MeshInputError, OptionError
@@ -19,7 +19,15 @@ from .halfedge import following
 from .prepare import Prepared
 from .sizing import Adaptive, adaptive_lengths, expected_faces, limit_gradation, target_lengths
 
-__all__ = ["Measures", "adaptive_limits", "check_gradation", "limited_lengths", "measure", "set_lengths"]
+__all__ = [
+    "Measures",
+    "adaptive_limits",
+    "bound_gradation",
+    "check_gradation",
+    "limited_lengths",
+    "measure",
+    "set_lengths",
+]
 
 # Longest target length in the frame of `Prepared`, where the mesh has an extent below 2: longer ones
 # mean the same, and their squares might overflow.
@@ -35,6 +43,10 @@ _ADAPTIVE_SHARE = 0.9
 
 # Where no face may exceed the distance even on the way.
 _DEVIATION_SHARE = 0.5
+
+
+# Rounds over all edges that bound the growth of lengths; each reaches one edge further.
+_GRADATION_ROUNDS = 32
 
 
 class Measures(NamedTuple):
@@ -60,6 +72,29 @@ def measure(prepared: Prepared) -> Measures:
         raise MeshInputError("all faces of F have no area: there is no surface to remesh")
     far = float(np.abs(prepared.centre).max()) * prepared.scale + 1.0
     return Measures(area, mean_edge, far)
+
+
+def bound_gradation(mesh: Mesh, gradation: float) -> None:
+    """Lower target lengths until the ratio along every edge is within bounds.
+
+    They are on the surface of the input already; an edge may take a short cut there. At edges that
+    must stay lengths are what these ask for.
+    """
+    h = np.flatnonzero(mesh.origin != DEAD)
+    a, b = mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]
+    frozen = np.zeros(len(mesh.X), np.bool_)
+    frozen[a[mesh.curve[h] == FROZEN]] = True
+    frozen[b[mesh.curve[h] == FROZEN]] = True
+    free = ~(frozen[a] | frozen[b])
+    a, b = a[free], b[free]
+    lengths = mesh.X[:, 3]
+    for _ in range(_GRADATION_ROUNDS):
+        steep = lengths[a] > gradation * lengths[b]
+        back = lengths[b] > gradation * lengths[a]
+        if not (steep.any() or back.any()):
+            break
+        np.minimum.at(lengths, a[steep], gradation * lengths[b[steep]])
+        np.minimum.at(lengths, b[back], gradation * lengths[a[back]])
 
 
 def check_gradation(value: Any) -> float:
@@ -200,9 +235,7 @@ def limited_lengths(prepared: Prepared, lengths: FloatArray, gradation: float) -
     return lengths
 
 
-def _check_output(
-    prepared: Prepared, measures: Measures, expected: float, max_faces: int
-) -> None:
+def _check_output(prepared: Prepared, measures: Measures, expected: float, max_faces: int) -> None:
     X, scale = prepared.mesh.X, prepared.scale
     shortest = float(X[:, 3].min())
     what = f"L = {shortest / scale:g}"

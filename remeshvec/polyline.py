@@ -162,7 +162,9 @@ def find_siblings(
     """
     if not len(candidates):
         return np.empty(0, np.int32), np.zeros(1, np.int32)
-    ends = np.stack([origin[candidates], origin[candidates - candidates % 3 + (candidates + 1) % 3]])
+    ends = np.stack(
+        [origin[candidates], origin[candidates - candidates % 3 + (candidates + 1) % 3]]
+    )
     vertices, place = np.unique(ends, return_inverse=True)
     place = place.reshape(2, -1)
     _, same = np.unique(X[vertices, :3] + 0.0, axis=0, return_inverse=True)  # no -0.0

@@ -30,10 +30,6 @@ class Prepared(NamedTuple):
     scale: float  # power of two
     dirt: dict[str, int]
 
-    def copy_mesh(self) -> Mesh:
-        """Return the mesh in arrays of its own: sweeps change them."""
-        return Mesh(*(array.copy() for array in self.mesh))
-
 
 def prepare(V: FloatArray, F: NDArray[np.int64], parallel: bool) -> Prepared:
     """Clean, orient, order and connect the input.

@@ -5,13 +5,13 @@ Here constraints become the arrays that all phases read: kinds of vertices, curv
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._jit import kernel
-from ._types import HELD, CURVE, FIXED, FROZEN, INNER, NONE, SEAM, IndexArray, Mesh
+from ._types import CURVE, FIXED, FROZEN, HELD, INNER, NONE, SEAM, IndexArray, Mesh
 from .bvh import build_tree
 from .constraints import Marks
 from .corners import find_corners
@@ -91,9 +91,9 @@ def build_reference(
     return Built(reference, on_seam, marks.held, keys, counts)
 
 
-def _ends(origin: IndexArray, which: NDArray[np.generic]) -> IndexArray:
+def _ends(origin: IndexArray, which: NDArray[Any]) -> IndexArray:
     """Both ends of half-edges, given as a mask or as indices."""
-    h = np.flatnonzero(which) if which.dtype == np.bool_ else which
+    h: NDArray[Any] = np.flatnonzero(which) if which.dtype == np.bool_ else which
     return origin[np.concatenate([h, h - h % 3 + (h + 1) % 3])]
 
 
@@ -186,7 +186,7 @@ def _mark(
 
 @kernel
 def _fill_patches(twin, patch):
-    """Number the sets of faces that hang together."""
+    """Give a number to each set of faces that hang together."""
     stack = np.empty(patch.size, np.int32)
     count = 0
     for seed in range(patch.size):

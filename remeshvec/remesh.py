@@ -8,7 +8,7 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ._check import as_mesh, positive_count
 from ._jit import compile_notice, thread_scope
@@ -24,7 +24,7 @@ from .lengths import (
     measure,
     set_lengths,
 )
-from .options import Options, make_options
+from .options import make_options
 from .prepare import Prepared, prepare
 from .reference import Built, build_reference
 from .report import RemeshResult, Report, Stopwatch
@@ -268,7 +268,7 @@ class _Job:
 
     def run(self, L: float | None = None) -> _Done:
         """Remesh a copy of the mesh."""
-        prepared = self.prepared._replace(mesh=self.prepared.copy_mesh())
+        prepared = self.prepared._replace(mesh=self.prepared.mesh.copy())
         mesh, watch = prepared.mesh, self.sweeps.watch
         sizing = self.sizing
         with watch.time("reference"):
@@ -309,7 +309,9 @@ def _meet_count(job: _Job, noun: str, wanted: int) -> _Done:
     """Remesh with one length after another until the count is met within 2 %."""
     faces = wanted if noun == "faces" else 2 * wanted
     if faces > job.sizing.max_faces:
-        raise OptionError(f"n_{noun} = {wanted:,} is more than max_faces = {job.sizing.max_faces:,}")
+        raise OptionError(
+            f"n_{noun} = {wanted:,} is more than max_faces = {job.sizing.max_faces:,}"
+        )
     L = sqrt(job.measures.area / faces / (sqrt(3.0) / 4.0)) / job.prepared.scale
     best = None
     for _ in range(_TRIES):
@@ -324,9 +326,7 @@ def _meet_count(job: _Job, noun: str, wanted: int) -> _Done:
     assert best is not None
     count = best.count(noun)
     if abs(count - wanted) > _NEAR * wanted:
-        job.sweeps.stop += (
-            f"; {count:,} {noun} are as near to {wanted:,} as {_TRIES} tries came"
-        )
+        job.sweeps.stop += f"; {count:,} {noun} are as near to {wanted:,} as {_TRIES} tries came"
     return best
 
 

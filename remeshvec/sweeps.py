@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from math import cos, radians
 from typing import Any
 
@@ -12,35 +13,32 @@ from ._types import (
     CURVE,
     DEAD,
     FIXED,
-    FROZEN,
     HELD,
     INNER,
-    NONE,
     PINNED,
-    SEAM,
     Blocks,
     FloatArray,
-    IndexArray,
     Mesh,
 )
-from .clean import weld_vertices
 from .deviation import DeviationGuard, edges_to_refine, shortened_lengths
 from .edge_sets import make_blocks
-from .operations.collapse import CollapseLimits, collapse_short_edges, collapse_siblings
+from .lengths import bound_gradation
+from .operations.collapse import CollapseLimits, collapse_short_edges
 from .operations.fit import fit_vertices
 from .operations.flip import FlipLimits, flip_edges
 from .operations.project import locate_vertices, project_vertices, read_lengths
 from .operations.relax import relax_vertices
+from .operations.siblings import collapse_siblings
 from .operations.slide import slide_vertices
 from .operations.split import MAX_ROUNDS, compact, split_edges, split_long_edges
 from .operations.unfold import undo_folds
 from .operations.untangle import untangle_vertices
 from .options import Options
-from .polyline import find_siblings
 from .reference import Built
 from .report import Stopwatch
+from .seams import find_seams, separate_sheets
 
-__all__ = ["Callback", "Sweeps", "seam_vertices"]
+__all__ = ["Callback", "Sweeps"]
 
 Callback = Callable[[int, str, int], Any]
 
@@ -57,9 +55,6 @@ _FIT_REACH = 0.2
 # Times that a sweep is tried with more of the mesh held, before it is left out.
 _ATTEMPTS = 8
 
-
-# Rounds over all edges that bound the growth of lengths; each reaches one edge further.
-_GRADATION_ROUNDS = 32
 
 # Faces made for a tolerance are moved until their centroids, which are not where they are worst, and
 # split until their samples keep these shares of it. Where more than this share of all faces would be
@@ -125,7 +120,7 @@ class Sweeps:
                 mesh = compact(mesh, blocks, self.is_parallel(mesh.origin.size // 3))
                 blocks = make_blocks(mesh)
             mesh, step = self._guarded(
-                mesh, lambda m, b=blocks, s=sweep: self._change(m, b, built, s, varies)
+                mesh, partial(self._change, blocks=blocks, built=built, sweep=sweep, varies=varies)
             )
             if self.stop == "cancelled" or self._has_converged(mesh, step):
                 break
@@ -179,7 +174,7 @@ class Sweeps:
             self.guard.remember(mesh)
         counts = self.counts[-1].copy()
         for attempt in range(_ATTEMPTS):
-            trial = Mesh(*(array.copy() for array in mesh))
+            trial = mesh.copy()
             self.counts[-1] = counts.copy()
             result = change(trial)
             with self.watch.time("deviation"):
@@ -192,9 +187,7 @@ class Sweeps:
         self.counts[-1] = counts | {"collapse": 0, "flip": 0}
         return mesh, np.inf
 
-    def _change(
-        self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, varies: bool
-    ) -> float:
+    def _change(self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, varies: bool) -> float:
         """Run the phases that change the mesh in place.
 
         Returns the root mean square of the steps of all vertices, in target lengths. Their maximum
@@ -220,7 +213,7 @@ class Sweeps:
         with self.watch.time("split"):
             for _ in range(MAX_ROUNDS):
                 parallel = self.is_parallel(mesh.origin.size // 3)
-                siblings = None if built.on_seam is None else _siblings(mesh)
+                siblings = None if built.on_seam is None else find_seams(mesh)
                 mesh, n_split = split_long_edges(mesh, blocks, factor, parallel, siblings)
                 if not n_split:
                     break
@@ -244,7 +237,7 @@ class Sweeps:
             tally = collapse_short_edges(mesh, blocks, limits, parallel)
             self.counts[-1]["collapse"] = int(tally[0])
             if built.on_seam is not None:
-                self.counts[-1]["collapse"] += collapse_siblings(mesh, *_siblings(mesh), limits)
+                self.counts[-1]["collapse"] += collapse_siblings(mesh, *find_seams(mesh), limits)
         if self._is_cancelled(sweep, "collapse"):
             return
         flips = FlipLimits(
@@ -274,7 +267,7 @@ class Sweeps:
                 undo_folds(mesh, blocks, before, parallel)
             if varies:
                 read_lengths(mesh, blocks, built.reference, parallel)
-                _bound_gradation(mesh, self.gradation)
+                bound_gradation(mesh, self.gradation)
 
     def finish(self, mesh: Mesh, built: Built) -> tuple[Mesh, FloatArray]:
         """Untangle, fit, and find where on the input every vertex lies."""
@@ -285,15 +278,17 @@ class Sweeps:
             mesh.kind[mesh.kind == HELD] = INNER
             mesh.kind[mesh.kind == PINNED] = CURVE
             if built.on_seam is not None:
-                mesh = _separate_sheets(mesh, built)
+                mesh = separate_sheets(mesh, built)
             blocks = make_blocks(mesh)
         with self.watch.time("finish"):
-            mesh, _ = self._guarded(mesh, lambda m: self._polish(m, blocks, built, parallel))
+            mesh, _ = self._guarded(
+                mesh, partial(self._polish, blocks=blocks, built=built, parallel=parallel)
+            )
             if self.tolerance is not None:
                 mesh = self._refine(mesh, built, self.tolerance)
                 blocks = make_blocks(mesh)
             if np.ptp(mesh.X[:, 3]) > 0.0:
-                _bound_gradation(mesh, self.gradation)
+                bound_gradation(mesh, self.gradation)
         guard = self.guard
         if guard is None and self.tolerance is not None:
             guard = DeviationGuard(built, self.tolerance, parallel)
@@ -331,7 +326,12 @@ class Sweeps:
         blocks, tree = make_blocks(mesh), built.reference.tree
         for _ in range(_EVENING_ROUNDS):
             if not untangle_vertices(
-                mesh, blocks, tree, self.options.project, 1.0 / 3.0, parallel,
+                mesh,
+                blocks,
+                tree,
+                self.options.project,
+                1.0 / 3.0,
+                parallel,
                 _CENTROID_SHARE * tolerance,
             ):
                 break
@@ -367,63 +367,3 @@ class Sweeps:
         if self.callback(sweep, phase, self.counts[-1].get(phase, 0)) is False:
             self.stop = "cancelled"
         return self.stop == "cancelled"
-
-
-def _bound_gradation(mesh: Mesh, gradation: float) -> None:
-    """Lower target lengths until the ratio along every edge is within bounds.
-
-    They are on the surface of the input already; an edge may take a short cut there. At edges that
-    must stay lengths are what these ask for.
-    """
-    h = np.flatnonzero(mesh.origin != DEAD)
-    a, b = mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]
-    frozen = np.zeros(len(mesh.X), np.bool_)
-    frozen[a[mesh.curve[h] == FROZEN]] = True
-    frozen[b[mesh.curve[h] == FROZEN]] = True
-    free = ~(frozen[a] | frozen[b])
-    a, b = a[free], b[free]
-    lengths = mesh.X[:, 3]
-    for _ in range(_GRADATION_ROUNDS):
-        steep = lengths[a] > gradation * lengths[b]
-        back = lengths[b] > gradation * lengths[a]
-        if not (steep.any() or back.any()):
-            break
-        np.minimum.at(lengths, a[steep], gradation * lengths[b[steep]])
-        np.minimum.at(lengths, b[back], gradation * lengths[a[back]])
-
-
-def _siblings(mesh: Mesh) -> tuple[IndexArray, IndexArray]:
-    """Half-edges on seams that may change, by groups of siblings."""
-    h = np.flatnonzero((mesh.curve >= SEAM) & (mesh.origin != DEAD)).astype(np.int32)
-    return find_siblings(mesh.X, mesh.origin, h)
-
-
-def seam_vertices(mesh: Mesh, built: Built) -> IndexArray:
-    """Vertices where sheets meet, those of all sheets."""
-    if built.on_seam is None:
-        return np.empty(0, np.int32)
-    h = np.flatnonzero((mesh.twin == NONE) & (mesh.origin != DEAD))
-    ends = np.concatenate([mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]])
-    ends = np.unique(ends)
-    return ends[built.on_seam[built.reference.origin[mesh.birth[ends]]]]
-
-
-def _separate_sheets(mesh: Mesh, built: Built) -> Mesh:
-    """Split inner edges that would run beside an edge of another sheet once the sheets are welded."""
-    on_seam = seam_vertices(mesh, built)
-    target = weld_vertices(mesh.X[:, :3], on_seam)
-    if target is None:
-        return mesh
-    is_on_seam = np.zeros(len(mesh.X), np.bool_)
-    is_on_seam[on_seam] = True
-    ends = mesh.origin, mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()
-    h = np.flatnonzero(
-        is_on_seam[ends[0]] & is_on_seam[ends[1]] & (mesh.twin < np.arange(len(mesh.twin)))
-    )
-    a, b = target[ends[0][h]].astype(np.int64), target[ends[1][h]].astype(np.int64)
-    keys = np.minimum(a, b) * len(mesh.X) + np.maximum(a, b)
-    _, place, count = np.unique(keys, return_inverse=True, return_counts=True)
-    doubled = (count[place] > 1) & (mesh.twin[h] != NONE)
-    if not doubled.any():
-        return mesh
-    return split_edges(mesh, make_blocks(mesh), h[doubled].astype(np.int32), False)

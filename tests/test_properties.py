@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import topology
 import zoo
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -274,7 +275,7 @@ def assert_proper(result, F):
     assert np.isfinite(result.V).all()
     assert shape["proper"] and shape["duplicate faces"] == 0
     assert zoo.unreferenced(result.V, result.F) == 0
-    once = list({frozenset(f): f for f in zoo.proper(F)}.values())
+    once = list({frozenset(f): f for f in topology.proper(F)}.values())
     assert sheets(result.F) == sheets(once)
     if not sheets(once) and "inconsistent_edges" not in result.report.dirt:
         assert shape["oriented"] and shape["manifold"]
@@ -300,7 +301,7 @@ def test_every_controlled_call_returns_a_proper_mesh(mesh, controls):
     V, F = zoo.ZOO[mesh["name"]].make()
     L = mesh["factor"] * zoo.mean_edge(V, F)
     V, F = zoo.perturb(V, F, mesh["amount"], mesh["seed"])
-    used = np.array(zoo.proper(F))
+    used = np.array(topology.proper(F))
     kept = wishes(used, controls)
     for name in ("fixed_faces", "face_labels"):  # in terms of the faces that are whole
         if name in kept and len(used) < len(F):

@@ -264,6 +264,20 @@ def test_held_faces_at_a_seam_freeze_it_on_all_sheets():
     assert at_seam.sum() == 5 and (mesh.curve[at_seam] == FROZEN).all()
 
 
+@pytest.mark.parametrize("wanted", ["boundary", "faces"])
+def test_lengths_beside_what_is_held_agree_on_all_sheets(wanted):
+    """Else midpoints of a seam would get other lengths on each, slide apart, and never be welded."""
+    V, F = zoo.perturb(*zoo.three_half_discs(), amount=0.1)
+    mesh, source = cut_open(V, F)
+    kept = {"boundary": "fixed"} if wanted == "boundary" else {"fixed_faces": [0, 7]}
+    result = featured(mesh, 0.1, vertex_source=source, **kept)
+    assert result.on_seam.any() and mesh.X[:, 3].max() > 0.3
+    low, high = np.full(len(V), np.inf), np.zeros(len(V))
+    np.minimum.at(low, source, mesh.X[:, 3])
+    np.maximum.at(high, source, mesh.X[:, 3])
+    assert np.array_equal(low, high)
+
+
 def test_a_vertex_fixed_on_one_sheet_is_fixed_on_all():
     V, F = nonmanifold.COMPLEXES["book"].make()
     mesh, source = cut_open(V, F)

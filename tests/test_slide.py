@@ -25,7 +25,7 @@ from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import split_long_edges
 
-SHARE = getattr(slide, "SHARE", 1.0)  # of the way to where the edges suit
+SHARE = slide._SHARE  # of the way to where the edges suit
 SHAPES = ["annulus", "cylinder", "closed_cylinder", "cube", "l_prism", "genus_2", "grid"]
 
 

@@ -3,9 +3,6 @@
 Candidates are the edges below the limit, in the order of the arrays (sorting them by length gains
 nothing). A collapse removes one end and moves the other to the midpoint or to the quadric point; it
 owns the closed one-rings of both ends. Guards: curves, link condition, overshoot, foldover, sliver.
-
-Siblings, the edges that lie in the same place on several sheets of a surface, collapse together or not
-at all: in a pass of their own, on one thread, since they are few.
 """
 
 from __future__ import annotations
@@ -16,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import prange
 
-from .._jit import driver, inlined, kernel
-from .._types import CURVE, DEAD, FROZEN, INNER, NONE, SEAM, Blocks, IndexArray, Mesh
+from .._jit import driver, inlined
+from .._types import CURVE, DEAD, FROZEN, INNER, NONE, SEAM, Blocks, Mesh
 from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
 from ..geometry import SHARP, distance_squared, face_vector
 from ..halfedge import following, previous
 from .guards import folds_over, keeps_curves, keeps_link, makes_sliver, overshoots
 
-__all__ = ["CollapseLimits", "collapse_short_edges", "collapse_siblings"]
+__all__ = ["COLLAPSED", "CollapseLimits", "collapse_short_edges", "examine_edge", "remove_edge"]
 
 # Outcomes of one candidate, and columns of the tally.
 COLLAPSED = 0
@@ -139,14 +136,14 @@ def _collapse_edge(mesh, h, low, high, limits, faces, ring, normals):
     c = mesh.curve[h]
     if c >= SEAM:
         return KEPT_CURVE
-    outcome, x, y, z, s, n_a, n_b = _examine(mesh, h, low, high, limits, faces, ring, normals)
+    outcome, x, y, z, s, n_a, n_b = examine_edge(mesh, h, low, high, limits, faces, ring, normals)
     if outcome == COLLAPSED:
-        _remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b)
+        remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b)
     return outcome
 
 
 @inlined
-def _examine(mesh, h, low, high, limits, faces, ring, normals):
+def examine_edge(mesh, h, low, high, limits, faces, ring, normals):
     """Ask every guard; returns the outcome, the new position and length, and the faces of both rings."""
     a = np.int64(mesh.origin[h])
     b = np.int64(mesh.origin[following(h)])
@@ -311,7 +308,7 @@ def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b, normals):
 
 
 @inlined
-def _remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b):
+def remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b):
     """Close the edge's one or two faces and give the other faces of the removed end to the survivor."""
     twin = mesh.twin
     a = np.int64(mesh.origin[h])
@@ -372,62 +369,3 @@ def _close_face(mesh, h, tn, tp):
     mesh.origin[3 * f] = DEAD
     mesh.origin[3 * f + 1] = DEAD
     mesh.origin[3 * f + 2] = DEAD
-
-
-def collapse_siblings(
-    mesh: Mesh, members: IndexArray, group: IndexArray, limits: CollapseLimits
-) -> int:
-    """Collapse short edges with siblings, all of a group or none; returns the number of groups.
-
-    Parameters
-    ----------
-    members : (k,) int32
-        Half-edges, those of a group together.
-    group : (g + 1,) int32
-        Where the groups start.
-    """
-    return int(_collapse_siblings(mesh, members, group, limits))
-
-
-@kernel
-def _collapse_siblings(mesh, members, group, limits):
-    faces = np.empty((2, RING_CAPACITY), np.int64)
-    ring = np.empty((2, RING_CAPACITY), np.int64)
-    normals = np.empty((2, RING_CAPACITY, 4))
-    touched = np.full(mesh.vertex_halfedge.size, NONE, np.int32)
-    end = np.int64(mesh.vertex_halfedge.size)
-    done = 0
-    for g in range(group.size - 1):
-        agreed = True
-        for i in range(group[g], group[g + 1]):
-            h = np.int64(members[i])
-            if mesh.origin[h] == DEAD:
-                agreed = False
-                break
-            outcome, _, _, _, _, n_a, n_b = _examine(mesh, h, 0, end, limits, faces, ring, normals)
-            # Where the rings of two siblings meet, on one sheet that meets itself, all stay.
-            if outcome != COLLAPSED or _claim(mesh, faces, n_a, n_b, touched, group[g], i):
-                agreed = False
-                break
-        if not agreed:
-            continue
-        done += 1
-        for i in range(group[g], group[g + 1]):
-            h = np.int64(members[i])
-            _, x, y, z, s, n_a, n_b = _examine(mesh, h, 0, end, limits, faces, ring, normals)
-            _remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b)
-    return done
-
-
-@inlined
-def _claim(mesh, faces, n_a, n_b, touched, first, mine):
-    """Mark all vertices around an edge; tells whether a sibling has marked one of them."""
-    met = False
-    for side in range(2):
-        for i in range(n_a if side == 0 else n_b):
-            h = faces[side, i]
-            for g in (h, following(h), previous(h)):
-                v = mesh.origin[g]
-                met |= touched[v] >= first and touched[v] < mine
-                touched[v] = mine
-    return met

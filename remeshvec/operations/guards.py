@@ -33,9 +33,7 @@ def keeps_curves(mesh, h, a, b):
     t = np.int64(mesh.twin[h])
     if joins_curves(mesh, h) or (t != NONE and joins_curves(mesh, t)):
         return False
-    return t != NONE or (
-        mesh.twin[following(h)] != NONE or mesh.twin[previous(h)] != NONE
-    )
+    return t != NONE or (mesh.twin[following(h)] != NONE or mesh.twin[previous(h)] != NONE)
 
 
 @inlined

@@ -3,8 +3,9 @@
 ``p += (I - n n^T) (g - p)`` with ``g = sum A_j p_j / sum A_j`` and A the mixed Voronoi area [Botsch and
 Kobbelt 2004, section 4], over the square of the target length where that varies [Dunyach et al. 2013,
 section 3]. All vertices move at once (Jacobi). Sums run over faces, not over rings: faces are read in
-order without dependent loads, and every normal and area is made once instead of three times. A block adds up the faces inside its vertex range; the faces across borders come after, on one
-thread, so each vertex sums in the same order on any number of threads.
+order without dependent loads, and every normal and area is made once instead of three times. A block
+adds up the faces inside its vertex range; the faces across borders come after, on one thread, so each
+vertex sums in the same order on any number of threads.
 """
 
 from __future__ import annotations

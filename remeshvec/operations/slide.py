@@ -11,7 +11,7 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined
-from .._types import CURVE, DEAD, FIXED, MAX_VALENCE, NONE, Blocks, FloatArray, Mesh
+from .._types import CURVE, DEAD, FIXED, MAX_VALENCE, NONE, Blocks, Mesh
 from ..halfedge import following, previous
 from ..polyline import move_on_curve
 from .project import Reference, project_curves

@@ -292,9 +292,7 @@ def _number(mesh, blocks, mask, starts, first_child, new_vertex, middle):
 
 
 @driver
-def _write_faces(
-    mesh, blocks, mask, first_child, new_vertex, middle, origin, twin, curve, source
-):
+def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, origin, twin, curve, source):
     """Write children and their twins: inside a template from its table, across by parts of edges."""
     for k in prange(blocks.face.size - 1):
         ids = np.empty(6, np.int64)

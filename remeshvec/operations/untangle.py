@@ -48,8 +48,9 @@ def untangle_vertices(
     """Improve rings with an angle below ``acos(limit)``; returns how many vertices moved.
 
     With a ``distance`` instead those with a face whose centroid is farther than that from the reference
-    surface, or whose squared circumradius exceeds ``limit`` squared target lengths. With ``on_surface`` every trial position is the closest point that a walk on the reference surface
-    finds, so that no projection spoils afterwards what was gained.
+    surface, where ``limit`` is a squared circumradius in squared target lengths that costs as much as
+    the distance. With ``on_surface`` every trial position is the closest point that a walk on the
+    reference surface finds, so that no projection spoils afterwards what was gained.
     """
     if distance > 0.0:
         distance = limit / distance**2  # both costs against one limit
@@ -60,7 +61,17 @@ def untangle_vertices(
     if count.any():
         for stage in stages(blocks):
             _untangle(
-                parallel, mesh, blocks, stage, tree, on_surface, limit, distance, candidates, count, moved
+                parallel,
+                mesh,
+                blocks,
+                stage,
+                tree,
+                on_surface,
+                limit,
+                distance,
+                candidates,
+                count,
+                moved,
             )
     return int(moved.sum())
 
@@ -87,9 +98,7 @@ def _find_bad_rings(mesh, blocks, tree, limit, distance, candidates, count):
 
 
 @driver
-def _untangle(
-    mesh, blocks, stage, tree, on_surface, limit, distance, candidates, count, moved
-):
+def _untangle(mesh, blocks, stage, tree, on_surface, limit, distance, candidates, count, moved):
     for k in prange(stage_blocks(blocks, stage)):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
@@ -209,9 +218,7 @@ def _search(X, birth, v, ring, n, tree, on_surface, limit, weight):
             if on_surface:
                 f, s, t, _ = walk_to_face(tree, cx, cy, cz, face)
                 cx, cy, cz = point_on_face(tree.corners, f, s, t)
-            trial = _cost(
-                ring, n, cx, cy, cz, X[v, 0], X[v, 1], X[v, 2], weight, scale, tree, f
-            )
+            trial = _cost(ring, n, cx, cy, cz, X[v, 0], X[v, 1], X[v, 2], weight, scale, tree, f)
             if trial < better:
                 bx, by, bz, better_face, better = cx, cy, cz, f, trial
         if better < best:

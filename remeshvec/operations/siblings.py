@@ -1,0 +1,77 @@
+"""Collapse siblings: the edges that lie in the same place on several sheets of a surface.
+
+All of a group collapse, or none does. They are few, and owned by no block: one thread takes them in
+order, with the guards of every other collapse.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._jit import inlined, kernel
+from .._types import DEAD, NONE, IndexArray, Mesh
+from ..halfedge import following, previous
+from .collapse import COLLAPSED, RING_CAPACITY, CollapseLimits, examine_edge, remove_edge
+
+__all__ = ["collapse_siblings"]
+
+
+def collapse_siblings(
+    mesh: Mesh, members: IndexArray, group: IndexArray, limits: CollapseLimits
+) -> int:
+    """Collapse short edges with siblings, all of a group or none; returns the number of groups.
+
+    Parameters
+    ----------
+    members : (k,) int32
+        Half-edges, those of a group together.
+    group : (g + 1,) int32
+        Where the groups start.
+    """
+    return int(_collapse_siblings(mesh, members, group, limits))
+
+
+@kernel
+def _collapse_siblings(mesh, members, group, limits):
+    faces = np.empty((2, RING_CAPACITY), np.int64)
+    ring = np.empty((2, RING_CAPACITY), np.int64)
+    normals = np.empty((2, RING_CAPACITY, 4))
+    touched = np.full(mesh.vertex_halfedge.size, NONE, np.int32)
+    end = np.int64(mesh.vertex_halfedge.size)
+    done = 0
+    for g in range(group.size - 1):
+        agreed = True
+        for i in range(group[g], group[g + 1]):
+            h = np.int64(members[i])
+            if mesh.origin[h] == DEAD:
+                agreed = False
+                break
+            outcome, _, _, _, _, n_a, n_b = examine_edge(
+                mesh, h, 0, end, limits, faces, ring, normals
+            )
+            # Where the rings of two siblings meet, on one sheet that meets itself, all stay.
+            if outcome != COLLAPSED or _claim(mesh, faces, n_a, n_b, touched, group[g], i):
+                agreed = False
+                break
+        if not agreed:
+            continue
+        done += 1
+        for i in range(group[g], group[g + 1]):
+            h = np.int64(members[i])
+            _, x, y, z, s, n_a, n_b = examine_edge(mesh, h, 0, end, limits, faces, ring, normals)
+            remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b)
+    return done
+
+
+@inlined
+def _claim(mesh, faces, n_a, n_b, touched, first, mine):
+    """Mark all vertices around an edge; tells whether a sibling has marked one of them."""
+    met = False
+    for side in range(2):
+        for i in range(n_a if side == 0 else n_b):
+            h = faces[side, i]
+            for g in (h, following(h), previous(h)):
+                v = mesh.origin[g]
+                met |= touched[v] >= first and touched[v] < mine
+                touched[v] = mine
+    return met
