@@ -29,8 +29,8 @@ from remeshvec.operations.collapse import (
     KEPT_CURVE,
     CollapseLimits,
     collapse_short_edges,
-    collapse_siblings,
 )
+from remeshvec.operations.siblings import collapse_siblings
 from remeshvec.polyline import find_siblings
 
 LOOSE = CollapseLimits(

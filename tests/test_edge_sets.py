@@ -201,6 +201,6 @@ def test_a_move_owns_the_closed_ring_of_its_vertex():
         tree = tree_of(mesh)
         blocks = all_but_the_last_vertex(mesh)
         untangle._untangle(
-            False, mesh, blocks, OWNED, tree, False, np.cos(0.8), candidates, count, moved
+            False, mesh, blocks, OWNED, tree, False, np.cos(0.8), 0.0, candidates, count, moved
         )
         assert candidates[0] == new[centre] and not moved.any()

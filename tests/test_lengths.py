@@ -9,6 +9,7 @@ import pytest
 import zoo
 
 from remeshvec import Adaptive, OptionError
+from remeshvec.constraints import make_constraints
 from remeshvec.lengths import check_gradation, measure, set_lengths
 from remeshvec.prepare import prepare
 
@@ -20,9 +21,16 @@ def prepared(V, F):
 def lengths(result, L, V=None, gradation=1.5, max_faces=10**9):
     """Set lengths; returns the length of the mean new face and those of all vertices, in V's units."""
     V = result.mesh.X[:, :3] / result.scale + result.centre if V is None else np.asarray(V, float)
-    none = np.zeros(result.mesh.origin.size, bool)
-    mean = set_lengths(result, measure(result), V, L, none, None, gradation, max_faces)
+    marks = make_constraints(len(V), F_of(result)).on_mesh(
+        result.mesh, result.vertex_source, result.face_source, result.same
+    )
+    mean = set_lengths(result, measure(result), V, L, marks, None, gradation, max_faces)
     return mean / result.scale, result.mesh.X[:, 3] / result.scale
+
+
+def F_of(result):
+    """Faces in terms of the input's vertices."""
+    return result.vertex_source[result.mesh.origin.reshape(-1, 3)].astype(np.int64)
 
 
 @pytest.mark.parametrize("name", ["torus", "grid", "cylinder", "genus_2"])

@@ -20,11 +20,12 @@ from structure import (
 from remeshvec import remesh
 from remeshvec._types import DEAD, FIXED, SEAM
 from remeshvec.edge_sets import make_blocks
-from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges, collapse_siblings
+from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.flip import FlipLimits, flip_edges
 from remeshvec.operations.project import read_lengths
 from remeshvec.operations.relax import relax_vertices
+from remeshvec.operations.siblings import collapse_siblings
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
 from remeshvec.operations.unfold import undo_folds
