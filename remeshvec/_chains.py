@@ -27,7 +27,7 @@ MAX_ENDS = 16
 
 # Lengths in target lengths, or in mean edges where these are longer.
 CHAIN_LENGTH = 4.0  # of a chain with a strong edge
-COMPONENT_LENGTH = 8.0
+COMPONENT_LENGTH = 12.0
 CLOSED_EDGES = 6  # of a sure component without loose ends, however short
 CLEAN_EDGES = 4  # of a chain or component that is half clean, however short
 

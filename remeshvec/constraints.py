@@ -53,7 +53,8 @@ class Constraints:
         same : (n_in,) int32, optional
             The vertex that stands for each of the input, where some were welded.
         """
-        n = int(vertex_source.max()) + 1
+        # A vertex that no face uses any more may have any index.
+        n = 1 + max(int(vertex_source.max()), int(self.feature_edges.max(initial=0)))
         ends = vertex_source[mesh.origin].astype(np.int64).reshape(-1, 3)
         keys = _edge_keys(ends.ravel(), np.roll(ends, -1, axis=1).ravel(), n)
         edges, vertices = self.feature_edges, self.fixed_vertices
@@ -188,7 +189,9 @@ def _edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:
         raise OptionError(
             f"feature_edges must have shape (k, 2), two vertices a row; got {array.shape}"
         )
-    edges = _indices(array.ravel(), n, "feature_edges", "vertex").reshape(-1, 2)
+    edges = np.stack(
+        [_indices(array[:, i], n, f"feature_edges[:, {i}]", "vertex") for i in (0, 1)], 1
+    )
     known = _edge_keys(F.ravel(), np.roll(F, -1, axis=1).ravel(), n)
     bad = np.flatnonzero(~np.isin(_edge_keys(edges[:, 0], edges[:, 1], n), known))
     if len(bad):

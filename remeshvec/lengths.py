@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._jit import kernel
-from ._types import DEAD, FROZEN, FloatArray, Mesh
+from ._types import DEAD, FROZEN, FloatArray, IndexArray, Mesh
 from .constraints import Marks
 from .creases import find_creases
 from .errors import MeshInputError, OptionError
@@ -74,8 +74,13 @@ def measure(prepared: Prepared) -> Measures:
     return Measures(area, mean_edge, far)
 
 
-def bound_gradation(mesh: Mesh, gradation: float) -> None:
+def bound_gradation(
+    mesh: Mesh, gradation: float, copies: tuple[IndexArray, IndexArray] | None = None
+) -> None:
     """Lower target lengths until the ratio along every edge is within bounds.
+
+    ``copies`` are vertices on seams and their places, see `seams.copies_on_seams`: those in one place get
+    the same length, or the sheets would part.
 
     They are on the surface of the input already; an edge may take a short cut there. At edges that
     must stay lengths are what these ask for.
@@ -95,6 +100,11 @@ def bound_gradation(mesh: Mesh, gradation: float) -> None:
             break
         np.minimum.at(lengths, a[steep], gradation * lengths[b[steep]])
         np.minimum.at(lengths, b[back], gradation * lengths[a[back]])
+        if copies is not None:
+            v, place = copies
+            shared = np.full(int(place.max()) + 1, np.inf)
+            np.minimum.at(shared, place, lengths[v])
+            lengths[v] = shared[place]
 
 
 def check_gradation(value: Any) -> float:

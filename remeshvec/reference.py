@@ -86,7 +86,7 @@ def build_reference(
     tree = build_tree(mesh.X, origin.reshape(-1, 3), inside, patch, parallel)
     arcs = measure_arcs(mesh.X, origin, name, beside)
     reference = Reference(tree, mesh.X.copy(), origin, beside, arcs)
-    _lengthen_beside(mesh, marks.frozen)
+    _lengthen_beside(mesh, vertex_source, marks.frozen)
     keys = _edge_keys(origin, is_feature, len(fixed))
     return Built(reference, on_seam, marks.held, keys, counts)
 
@@ -102,7 +102,7 @@ def _edge_keys(origin: IndexArray, which: BoolArray, n: int) -> NDArray[np.int64
     return ends[0] * n + ends[1]
 
 
-def _lengthen_beside(mesh: Mesh, frozen: BoolArray) -> None:
+def _lengthen_beside(mesh: Mesh, vertex_source: IndexArray, frozen: BoolArray) -> None:
     """Let the target length at the ends of an edge that must not be split reach that of the edge.
 
     The other edges of its faces cannot all be shorter than half of it: they would be split for ever.
@@ -112,8 +112,10 @@ def _lengthen_beside(mesh: Mesh, frozen: BoolArray) -> None:
     if len(h):
         a, b = _ends(mesh.origin, h).reshape(2, -1)
         length = np.linalg.norm(mesh.X[a, :3] - mesh.X[b, :3], axis=1)
-        np.maximum.at(mesh.X[:, 3], a, length)
-        np.maximum.at(mesh.X[:, 3], b, length)
+        longest = np.zeros(int(vertex_source.max()) + 1)  # the same on all sheets
+        np.maximum.at(longest, vertex_source[a], length)
+        np.maximum.at(longest, vertex_source[b], length)
+        np.maximum(mesh.X[:, 3], longest[vertex_source], out=mesh.X[:, 3])
 
 
 def _touched(origin: IndexArray, is_feature: BoolArray, n: int) -> BoolArray:

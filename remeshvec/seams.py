@@ -11,7 +11,7 @@ from .operations.split import split_edges
 from .polyline import find_siblings
 from .reference import Built
 
-__all__ = ["find_seams", "seam_vertices", "separate_sheets"]
+__all__ = ["copies_on_seams", "find_seams", "seam_vertices", "separate_sheets"]
 
 
 def find_seams(mesh: Mesh) -> tuple[IndexArray, IndexArray]:
@@ -30,6 +30,17 @@ def seam_vertices(mesh: Mesh, built: Built) -> IndexArray:
     return ends[built.on_seam[built.reference.origin[mesh.birth[ends]]]]
 
 
+def copies_on_seams(mesh: Mesh, built: Built) -> tuple[IndexArray, IndexArray] | None:
+    """Vertices on seams and a number for the place of each, the same on all sheets; None for none."""
+    if built.on_seam is None:
+        return None
+    v = seam_vertices(mesh, built)
+    if not len(v):
+        return None
+    _, place = np.unique(mesh.X[v, :3] + 0.0, axis=0, return_inverse=True)
+    return v, place.reshape(-1).astype(np.int32)
+
+
 def separate_sheets(mesh: Mesh, built: Built) -> Mesh:
     """Split inner edges that would run beside an edge of another sheet once the sheets are welded."""
     on_seam = seam_vertices(mesh, built)
@@ -40,7 +51,7 @@ def separate_sheets(mesh: Mesh, built: Built) -> Mesh:
     is_on_seam[on_seam] = True
     ends = mesh.origin, mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()
     h = np.flatnonzero(
-        is_on_seam[ends[0]] & is_on_seam[ends[1]] & (mesh.twin < np.arange(len(mesh.twin)))
+        (is_on_seam[ends[0]] | is_on_seam[ends[1]]) & (mesh.twin < np.arange(len(mesh.twin)))
     )
     a, b = target[ends[0][h]].astype(np.int64), target[ends[1][h]].astype(np.int64)
     keys = np.minimum(a, b) * len(mesh.X) + np.maximum(a, b)

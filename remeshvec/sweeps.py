@@ -36,7 +36,7 @@ from .operations.untangle import untangle_vertices
 from .options import Options
 from .reference import Built
 from .report import Stopwatch
-from .seams import find_seams, separate_sheets
+from .seams import copies_on_seams, find_seams, separate_sheets
 
 __all__ = ["Callback", "Sweeps"]
 
@@ -267,7 +267,7 @@ class Sweeps:
                 undo_folds(mesh, blocks, before, parallel)
             if varies:
                 read_lengths(mesh, blocks, built.reference, parallel)
-                bound_gradation(mesh, self.gradation)
+                bound_gradation(mesh, self.gradation, copies_on_seams(mesh, built))
 
     def finish(self, mesh: Mesh, built: Built) -> tuple[Mesh, FloatArray]:
         """Untangle, fit, and find where on the input every vertex lies."""
@@ -288,7 +288,7 @@ class Sweeps:
                 mesh = self._refine(mesh, built, self.tolerance)
                 blocks = make_blocks(mesh)
             if np.ptp(mesh.X[:, 3]) > 0.0:
-                bound_gradation(mesh, self.gradation)
+                bound_gradation(mesh, self.gradation, copies_on_seams(mesh, built))
         guard = self.guard
         if guard is None and self.tolerance is not None:
             guard = DeviationGuard(built, self.tolerance, parallel)

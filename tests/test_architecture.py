@@ -23,11 +23,11 @@ LEVELS = {
     4: [
         "operations", "operations.split", "operations.collapse", "operations.flip",
         "operations.relax", "operations.project", "operations.slide", "operations.unfold",
-        "operations.untangle", "operations.fit", "operations.guards",
+        "operations.untangle", "operations.fit", "operations.guards", "operations.siblings",
     ],
     5: [
-        "options", "constraints", "prepare", "lengths", "reference", "deviation", "report",
-        "sweeps", "extract", "remesh",
+        "options", "constraints", "prepare", "lengths", "reference", "seams", "deviation",
+        "report", "sweeps", "extract", "remesh",
     ],
     6: ["_file_guards", "_ply_guard", "_mesh_writers", "mesh_files"],
     7: ["viz", "_arguments", "_array_files", "cli"],
@@ -36,18 +36,20 @@ LEVELS = {
 SIDEWAYS = {
     ("_check", "errors"),
     ("bvh", "halfedge"), ("curves", "halfedge"), ("orient", "halfedge"), ("polyline", "halfedge"),
-    ("distance", "quality"),
     ("creases", "_chains"), ("creases", "_echo"), ("sizing", "curvature"), ("sizing", "gradation"),
-    ("operations.collapse", "operations.guards"), ("operations.slide", "operations.project"),
+    ("operations.collapse", "operations.guards"), ("operations.siblings", "operations.collapse"),
+    ("operations.slide", "operations.project"),
     ("lengths", "constraints"), ("lengths", "prepare"),
-    ("reference", "constraints"), ("deviation", "reference"), ("report", "options"),
-    ("sweeps", "options"), ("sweeps", "reference"), ("sweeps", "deviation"), ("sweeps", "report"),
-    ("extract", "constraints"), ("extract", "prepare"), ("extract", "reference"),
-    ("extract", "sweeps"),
+    ("reference", "constraints"), ("seams", "reference"), ("deviation", "reference"),
+    ("report", "options"),
+    *(("sweeps", name) for name in (
+        "options", "lengths", "reference", "seams", "deviation", "report",
+    )),
+    *(("extract", name) for name in ("constraints", "prepare", "reference", "seams")),
     *(("remesh", name) for name in (
         "options", "constraints", "prepare", "lengths", "reference", "sweeps", "extract", "report",
     )),
-    ("_ply_guard", "_file_guards"), ("_mesh_writers", "_file_guards"),
+    ("_ply_guard", "_file_guards"),
     ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
     ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"),
 }  # fmt: skip

@@ -220,7 +220,9 @@ def test_many_points(count, hinted):
     corners = mesh.X[faces_of(mesh)[faces], :3]
     there = [naive.closest_on_triangle(p, *T)[1] for p, T in zip(P, corners, strict=True)]
     assert distance == pytest.approx(there, rel=1e-9)
-    for one, two in zip((faces, distance), closest_faces(tree_of(mesh), P, hint, 0.0, True), strict=True):
+    for one, two in zip(
+        (faces, distance), closest_faces(tree_of(mesh), P, hint, 0.0, True), strict=True
+    ):
         assert one.tobytes() == two.tobytes()
 
 

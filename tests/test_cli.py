@@ -118,7 +118,9 @@ def test_statistics_of_what_json_lacks_are_null(sheet, monkeypatch):
 def test_default_options_are_left_to_the_library(sheet, asked):
     assert main([sheet]) == 0
     assert isinstance(asked[0].pop("callback"), Progress)
-    assert asked == [{"L": None, "preset": "default"}]
+    assert asked == [
+        {"L": None, "preset": "default", "feature_angle": "auto", "boundary": "free"}
+    ]
 
 
 def test_options_reach_the_library(sheet, asked):
@@ -129,6 +131,8 @@ def test_options_reach_the_library(sheet, asked):
         {
             "L": 0.2,
             "preset": "fast",
+            "feature_angle": "auto",
+            "boundary": "free",
             "iterations": 2,
             "split": 1.5,
             "collapse": 0.5,

@@ -17,7 +17,7 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import HELD, CURVE, DEAD, FIXED, INNER
+from remeshvec._types import CURVE, DEAD, FIXED, HELD, INNER
 from remeshvec.operations.collapse import (
     COLLAPSED,
     KEPT_CURVE,

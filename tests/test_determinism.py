@@ -208,7 +208,11 @@ CONTROLLED = {
     "round seams": (lambda: nonmanifold.double_bubble(60, 21), {"feature_angle": None}),
     "held": (
         lambda: zoo.upsampled(*zoo.annulus(24, 5), noise=0.3),
-        {"fixed_faces": list(range(0, 300, 17)), "fixed_vertices": [3, 50, 77], "boundary": "split"},
+        {
+            "fixed_faces": list(range(0, 300, 17)),
+            "fixed_vertices": [3, 50, 77],
+            "boundary": "split",
+        },
     ),
     "selection": (mesh, {"selection": list(range(500, 1500))}),
     "labels": (mesh, {"face_labels": [k // 900 for k in range(3072)]}),

@@ -20,34 +20,76 @@ def made(**wanted):
 
 
 BAD = {
-    "angle of nothing": ({"feature_angle": 0.0}, r'feature_angle must be "auto", None or degrees .*got 0\.0'),
-    "angle of all": ({"feature_angle": 180}, r"feature_angle must be .* between 0 and 180; got 180"),
+    "angle of nothing": (
+        {"feature_angle": 0.0},
+        r'feature_angle must be "auto", None or degrees .*got 0\.0',
+    ),
+    "angle of all": (
+        {"feature_angle": 180},
+        r"feature_angle must be .* between 0 and 180; got 180",
+    ),
     "angle by name": ({"feature_angle": "sharp"}, r"feature_angle must be .* got 'sharp'"),
     "angle as truth": ({"feature_angle": True}, r"feature_angle must be .* got True"),
     "angle nan": ({"feature_angle": float("nan")}, r"feature_angle must be .* got nan"),
     "angle array": ({"feature_angle": np.array([30.0])}, r"feature_angle must be"),
     "boundary": ({"boundary": "fix"}, r"boundary must be one of free, split, fixed; got 'fix'"),
     "boundary array": ({"boundary": np.array(["free"])}, r"boundary must be one of"),
-    "vertex too large": ({"fixed_vertices": [0, 20]}, r"fixed_vertices\[1\] = 20 is no vertex index; they run from 0 to 19"),
+    "vertex too large": (
+        {"fixed_vertices": [0, 20]},
+        r"fixed_vertices\[1\] = 20 is no vertex index; they run from 0 to 19",
+    ),
     "vertex negative": ({"fixed_vertices": [-1]}, r"fixed_vertices\[0\] = -1 is no vertex index"),
-    "vertex float": ({"fixed_vertices": [1.0]}, r"fixed_vertices must hold vertex indices; got shape \(1,\) of float64"),
-    "vertex mask": ({"fixed_vertices": np.ones(N, bool)}, r"fixed_vertices must hold vertex indices; .* of bool"),
-    "vertex matrix": ({"fixed_vertices": [[0, 1]]}, r"fixed_vertices must hold vertex indices; got shape \(1, 2\)"),
-    "vertex ragged": ({"fixed_vertices": [[0], [1, 2]]}, r"fixed_vertices is no rectangular array"),
-    "vertex object": ({"fixed_vertices": [None]}, r"fixed_vertices is no rectangular array of numbers"),
-    "face too large": ({"fixed_faces": [3, 24]}, r"fixed_faces\[1\] = 24 is no face index; they run from 0 to 23"),
-    "face mask": ({"fixed_faces": np.ones(5, bool)}, r"fixed_faces as a mask must have shape \(24,\); got \(5,\)"),
+    "vertex float": (
+        {"fixed_vertices": [1.0]},
+        r"fixed_vertices must hold vertex indices; got shape \(1,\) of float64",
+    ),
+    "vertex mask": (
+        {"fixed_vertices": np.ones(N, bool)},
+        r"fixed_vertices must hold vertex indices; .* of bool",
+    ),
+    "vertex matrix": (
+        {"fixed_vertices": [[0, 1]]},
+        r"fixed_vertices must hold vertex indices; got shape \(1, 2\)",
+    ),
+    "vertex ragged": (
+        {"fixed_vertices": [[0], [1, 2]]},
+        r"fixed_vertices is no rectangular array",
+    ),
+    "vertex object": (
+        {"fixed_vertices": [None]},
+        r"fixed_vertices is no rectangular array of numbers",
+    ),
+    "face too large": (
+        {"fixed_faces": [3, 24]},
+        r"fixed_faces\[1\] = 24 is no face index; they run from 0 to 23",
+    ),
+    "face mask": (
+        {"fixed_faces": np.ones(5, bool)},
+        r"fixed_faces as a mask must have shape \(24,\); got \(5,\)",
+    ),
     "face float": ({"fixed_faces": [0.5]}, r"fixed_faces must hold face indices"),
     "selection": ({"selection": [24]}, r"selection\[0\] = 24 is no face index"),
-    "selection mask": ({"selection": np.ones((24, 1), bool)}, r"selection as a mask must have shape \(24,\); got \(24, 1\)"),
-    "labels short": ({"face_labels": [1, 2]}, r"face_labels must hold one whole number a face, shape \(24,\); got shape \(2,\)"),
+    "selection mask": (
+        {"selection": np.ones((24, 1), bool)},
+        r"selection as a mask must have shape \(24,\); got \(24, 1\)",
+    ),
+    "labels short": (
+        {"face_labels": [1, 2]},
+        r"face_labels must hold one whole number a face, shape \(24,\); got shape \(2,\)",
+    ),
     "labels float": ({"face_labels": np.zeros(M)}, r"face_labels must hold .* of float64"),
     "labels text": ({"face_labels": ["a"] * M}, r"face_labels must hold .* of <U1"),
-    "edge shape": ({"feature_edges": [0, 1]}, r"feature_edges must have shape \(k, 2\), two vertices a row; got \(2,\)"),
-    "edge too large": ({"feature_edges": [[0, 1], [1, 20]]}, r"feature_edges.* = 20 is no vertex index"),
+    "edge shape": (
+        {"feature_edges": [0, 1]},
+        r"feature_edges must have shape \(k, 2\), two vertices a row; got \(2,\)",
+    ),
+    "edge too large": (
+        {"feature_edges": [[0, 1], [1, 20]]},
+        r"feature_edges.* = 20 is no vertex index",
+    ),
     "edge that is none": ({"feature_edges": [[0, 1], [0, 19]]}, r"feature_edges.*\b1\b"),
     "edge of one vertex": ({"feature_edges": [[3, 3]]}, r"feature_edges"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.filterwarnings("error")
@@ -171,7 +213,9 @@ def test_faces_come_from_where_they_come_from():
     order = np.random.default_rng(0).permutation(M)[: M - 4]
     mesh = built(V, F[order])
     labels = np.arange(M)
-    marks = marks_of(mesh, faces=order, n=N, G=F, fixed_faces=[order[0], order[5]], face_labels=labels)
+    marks = marks_of(
+        mesh, faces=order, n=N, G=F, fixed_faces=[order[0], order[5]], face_labels=labels
+    )
     assert np.flatnonzero(marks.held).tolist() == [0, 5]
     assert np.array_equal(marks.hard, mesh.twin != NONE)
 
@@ -212,7 +256,9 @@ def test_welded_vertices_stand_for_each_other():
     a, b = next(sorted(e) for e in naive.edges(F) if 7 in e and 12 not in e)
     other = a + b - 7
     G = np.where(F == 7, N, F)  # the input used the copy
-    marks = marks_of(mesh, same=same, n=N + 2, G=G, fixed_vertices=[N + 1], feature_edges=[[N, other]])
+    marks = marks_of(
+        mesh, same=same, n=N + 2, G=G, fixed_vertices=[N + 1], feature_edges=[[N, other]]
+    )
     assert np.flatnonzero(marks.fixed).tolist() == [12]
     assert ends(mesh, marks.hard) == {frozenset((7, other))}
 
@@ -221,7 +267,9 @@ def test_vertices_that_no_face_uses_mark_nothing():
     """Also where their numbers lie beyond those of all others: no edge is taken for another."""
     mesh = built(V, F)
     G = np.vstack([F, [[0, 0, N + 7]]])  # the last face was dropped
-    neighbour = next(w for w in naive.neighbours(F)[1] if frozenset((1, w)) not in naive.boundary_edges(F))
+    neighbour = next(
+        w for w in naive.neighbours(F)[1] if frozenset((1, w)) not in naive.boundary_edges(F)
+    )
     for far in (N + 7, N + neighbour):
         G[-1, 2] = far
         edge = [[0, far]]

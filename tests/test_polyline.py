@@ -1,6 +1,7 @@
-"""Curves of the reference: names, siblings, who follows whom, and the closest point of one's own stretch."""
+"""Curves of the reference: names, siblings, who follows whom, arc lengths, and the closest point."""
 
 from collections import defaultdict
+from itertools import pairwise
 
 import naive
 import nonmanifold
@@ -21,7 +22,16 @@ from remeshvec.polyline import (
     name_edges,
 )
 
-CREASED = ["cube", "l_prism", "genus_2", "closed_cylinder", "cylinder", "annulus", "grid", "triangle"]
+CREASED = [
+    "cube",
+    "l_prism",
+    "genus_2",
+    "closed_cylinder",
+    "cylinder",
+    "annulus",
+    "grid",
+    "triangle",
+]
 CUT = ["half_discs", "two_cubes", "book", "wall_inside", "two_planes", "three_planes", "four_cubes"]
 
 
@@ -109,7 +119,7 @@ def test_siblings_lie_in_the_same_place(name):
     for given in (candidates, shuffled):
         members, group = find_siblings(mesh.X, mesh.origin, given)
         assert members.dtype == group.dtype == np.int32
-        found = [tuple(members[i:j].tolist()) for i, j in zip(group[:-1], group[1:], strict=True)]
+        found = [tuple(members[i:j].tolist()) for i, j in pairwise(group)]
         assert len(found) == len(set(found)) and set(found) == expected
         assert group[0] == 0 and group[-1] == len(members)
 
@@ -140,7 +150,7 @@ def test_edges_of_no_length_are_siblings_of_each_other_only():
     V = np.repeat(np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3.0]]), 3, axis=0)
     mesh = built(V, [[0, 1, 3], [2, 6, 7], [8, 9, 10]])
     members, group = siblings_of(mesh)
-    found = [members[i:j].tolist() for i, j in zip(group[:-1], group[1:], strict=True)]
+    found = [members[i:j].tolist() for i, j in pairwise(group)]
     assert sorted(found) == [[1, 2], [3, 5], [6, 8]]
 
 
@@ -164,7 +174,8 @@ def test_an_edge_has_one_name_on_all_its_sides(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "cornered"), [(name, c) for name in CREASED for c in (False, True)] + [(name, True) for name in CUT]
+    ("name", "cornered"),
+    [(name, c) for name in CREASED for c in (False, True)] + [(name, True) for name in CUT],
 )
 def test_neighbours_share_an_end_that_is_no_corner(name, cornered):
     mesh, is_feature = features_of(name)
@@ -241,7 +252,9 @@ def test_arcs_go_on_from_edge_to_edge(name):
             for v, arc in zip(ends(mesh, h), arcs[:2, h], strict=True):
                 joints[(mesh.X[v, :3] + 0.0).tobytes()].add(float(arc))
         doubled = [found for found in joints.values() if len(found) > 1]
-        assert len(doubled) <= 1 and all(found == {0.0, abs(arcs[2, chain[0]])} for found in doubled)
+        assert len(doubled) <= 1 and all(
+            found == {0.0, abs(arcs[2, chain[0]])} for found in doubled
+        )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -254,10 +267,10 @@ def test_arcs_over_an_edge_of_no_length(k, seed):
     mesh = built(V, F)
     line = np.arange(1, 21, 3)
     featured(mesh, 1.0, feature_edges=np.stack([line[:-1], line[1:]], axis=1))
-    edges, beside, arcs = arcs_of(mesh)
+    edges, _, arcs = arcs_of(mesh)
     found = {frozenset(ends(mesh, h)): np.sort(arcs[:2, h]).tolist() for h in edges.tolist()}
-    spans = sorted(found[frozenset(edge)] for edge in zip(line[:-1].tolist(), line[1:].tolist(), strict=True))
-    steps = [naive.edge_length(V, edge) for edge in zip(line[:-1], line[1:], strict=True)]
+    spans = [found[frozenset(edge)] for edge in pairwise(line.tolist())]
+    steps = [naive.edge_length(V, edge) for edge in pairwise(line)]
     assert sorted(high - low for low, high in spans) == pytest.approx(sorted(steps))
     assert max(high for _, high in spans) == pytest.approx(sum(steps))
     here = next(h for h in edges.tolist() if set(ends(mesh, h)) == {1, 4})
@@ -273,7 +286,7 @@ def test_arcs_around_a_loop_with_an_edge_of_no_length():
         V[30] = V[23]
         mesh = built(V, F)
         draw(mesh, loop)
-        edges, beside, arcs = arcs_of(mesh)
+        edges, _, arcs = arcs_of(mesh)
         edges = [h for h in edges.tolist() if set(ends(mesh, h)) <= set(loop)]
         length = [naive.edge_length(V, ends(mesh, h)) for h in edges]
         assert abs(arcs[1, edges] - arcs[0, edges]) == pytest.approx(length)
@@ -355,7 +368,10 @@ def polygon(points, spacing):
 
 def distance_within_reach(mesh, names, start, p):
     """Distance to all edges of a polyline that begin within three times the distance to the first."""
-    foot = lambda h: np.linalg.norm(p - naive.closest_on_segment(p, *mesh.X[list(ends(mesh, h)), :3]))  # noqa: E731
+
+    def foot(h):
+        return np.linalg.norm(p - naive.closest_on_segment(p, *mesh.X[list(ends(mesh, h)), :3]))
+
     reach, best = 3 * foot(start), foot(start)
     at = defaultdict(set)
     for h in names.tolist():

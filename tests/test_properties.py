@@ -82,7 +82,9 @@ def wishes(F, controls):
     """Random parts of a mesh to be kept, as keywords; a share of each kind."""
     rng = np.random.default_rng(controls["seed"])
     some = lambda n: rng.choice(n, round(controls["share"] * n), replace=False)  # noqa: E731
-    edges = np.unique(np.sort(np.vstack([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1), axis=0)
+    edges = np.unique(
+        np.sort(np.vstack([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1), axis=0
+    )
     kept = {
         "feature_edges": edges[some(len(edges))],
         "fixed_vertices": np.unique(F)[some(len(np.unique(F)))],

@@ -65,7 +65,9 @@ def assert_built(mesh, result):
     numbered = {frozenset(np.flatnonzero(patch == k).tolist()) for k in range(patch.max() + 1)}
     assert numbered == patches_of(mesh, reference)
     assert np.array_equal(mesh.source, np.arange(len(patch)))
-    assert np.array_equal(mesh.origin[mesh.birth[mesh.kind != CURVE]], np.flatnonzero(mesh.kind != CURVE))
+    assert np.array_equal(
+        mesh.origin[mesh.birth[mesh.kind != CURVE]], np.flatnonzero(mesh.kind != CURVE)
+    )
     for v in np.flatnonzero(mesh.kind == CURVE):  # or a copy of it, on another sheet
         h = int(mesh.birth[v])
         places = reference.X[[mesh.origin[h], mesh.origin[next_of(h)]], :3]
@@ -291,7 +293,9 @@ def test_a_curve_that_crosses_a_seam_on_one_sheet_is_a_junction_of_all():
     V, F = nonmanifold.COMPLEXES["book"].make()
     mesh, source = cut_open(V, F)
     (v,) = (v for v in range(len(V)) if not V[v, :2].any() and np.isclose(V[v, 2], 0.4))
-    page = next(w for w in naive.neighbours(F)[v] if V[w, :2].any() and np.isclose(V[w, 2], V[v, 2]))
+    page = next(
+        w for w in naive.neighbours(F)[v] if V[w, :2].any() and np.isclose(V[w, 2], V[v, 2])
+    )
     result = featured(mesh, 0.2, vertex_source=source, feature_edges=[[v, page]])
     assert_built(mesh, result)
     assert (mesh.kind[source == v] == FIXED).all()

@@ -25,7 +25,7 @@ from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import split_long_edges
 
-SHARE = slide._SHARE  # of the way to where the edges suit
+SHARE = slide.SHARE  # of the way to where the edges suit
 SHAPES = ["annulus", "cylinder", "closed_cylinder", "cube", "l_prism", "genus_2", "grid"]
 
 
@@ -88,7 +88,7 @@ def polylines(mesh, reference):
     """Polyline of every name."""
     names = np.unique(mesh.curve[mesh.curve >= 0] & (SEAM - 1))
     found = {}
-    todo = set(np.flatnonzero((reference.arcs[2] != 0)).tolist()) | set(names.tolist())
+    todo = set(np.flatnonzero(reference.arcs[2] != 0).tolist()) | set(names.tolist())
     while todo:
         group, stack = set(), [min(todo)]
         while stack:
@@ -135,7 +135,9 @@ def slid(mesh, reference):
                 (moving,) = ends
                 corner = u + w - moving
                 front, back = (moving, corner) if arcs[moving] > t else (corner, moving)
-                distances = (arcs[moving] - t, t) if front == moving else (line.total - t, t - arcs[moving])
+                distances = (
+                    (arcs[moving] - t, t) if front == moving else (line.total - t, t - arcs[moving])
+                )
         suits = [mesh.X[v, 3] + mesh.X[x, 3] for x in (front, back)]
         step = suits[1] / sum(suits) * sum(distances) - distances[1]
         result[v] = line.point(t + SHARE * step)
@@ -170,7 +172,7 @@ def test_others_stay(kind):
     mesh.kind[still] = kind
     before = mesh.X.copy()
     slide_vertices(mesh, one_block(mesh), reference, False)
-    moved = (mesh.X != before).any(axis=1)
+    moved = (before != mesh.X).any(axis=1)
     assert moved.any() and (mesh.kind[moved] == CURVE).all()
     assert np.array_equal(mesh.X[still], before[still])
 

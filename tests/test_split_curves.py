@@ -1,5 +1,7 @@
 """Splits along and beside curves: flags on both halves, frozen edges, siblings, births of midpoints."""
 
+from itertools import pairwise
+
 import naive
 import nonmanifold
 import numpy as np
@@ -153,7 +155,9 @@ def test_frozen_edges_are_never_split(factor):
 
 
 def place(mesh, h):
-    return frozenset(tuple(mesh.X[v, :3].tolist()) for v in (mesh.origin[h], mesh.origin[next_of(h)]))
+    return frozenset(
+        tuple(mesh.X[v, :3].tolist()) for v in (mesh.origin[h], mesh.origin[next_of(h)])
+    )
 
 
 def test_a_low_face_beside_a_frozen_edge_splits_its_longest_other_one():
@@ -185,7 +189,9 @@ def test_rounds_end_beside_frozen_edges():
 def test_told_to_any_edge_is_split():
     mesh = crossed()
     edges = np.array([half_edge(mesh, 9, 10), half_edge(mesh, 27, 35)], np.int32)
-    middles = {tuple(sum(mesh.X[[mesh.origin[h], mesh.origin[next_of(int(h))]], :3]) / 2) for h in edges}
+    middles = {
+        tuple(sum(mesh.X[[mesh.origin[h], mesh.origin[next_of(int(h))]], :3]) / 2) for h in edges
+    }
     refined = split_edges(mesh, one_block(mesh), edges, False)
     assert_valid(refined)
     new = set(map(tuple, refined.X[:, :3].tolist())) - set(map(tuple, mesh.X[:, :3].tolist()))
@@ -241,20 +247,21 @@ def test_seams_stay_closed(name, factor):
     mesh = rounds(mesh, 1.2, seams)
     found = sheets_at_places(mesh)
     assert len(found) > len(sheets) or factor > 0.2
-    lengths = {count: 0.0 for count in sheets.values()}
+    lengths = dict.fromkeys(sheets.values(), 0.0)
     for edge, count in found.items():
         lengths[count] += np.linalg.norm(np.subtract(*edge))
     for count in lengths:
         old = sum(np.linalg.norm(np.subtract(*edge)) for edge, k in sheets.items() if k == count)
         assert lengths[count] == pytest.approx(old, rel=1e-9)
     members, group = seams(mesh)
-    for i, j in zip(group[:-1], group[1:], strict=True):
+    for i, j in pairwise(group):
         assert len(set((mesh.curve[members[i:j]]).tolist())) == 1
         for end in range(2):
             at = [sibling_ends(mesh, h)[end] for h in members[i:j].tolist()]
-            assert len({(int(mesh.kind[v]), int(mesh.birth[v]), mesh.X[v, 3]) for v in at}) == 1 or (
-                mesh.kind[at] == FIXED
-            ).all()
+            assert (
+                len({(int(mesh.kind[v]), int(mesh.birth[v]), mesh.X[v, 3]) for v in at}) == 1
+                or (mesh.kind[at] == FIXED).all()
+            )
     assert_on_reference(mesh, built_.reference)
 
 
@@ -328,7 +335,9 @@ def test_births_along_a_curve(kinds, births, expected, curve):
     assert bent(kinds, births, curve) == (CURVE, expected)
 
 
-@pytest.mark.parametrize("name", ["cube", "genus_2", "l_prism", "closed_cylinder", "annulus", "grid"])
+@pytest.mark.parametrize(
+    "name", ["cube", "genus_2", "l_prism", "closed_cylinder", "annulus", "grid"]
+)
 def test_births_lie_on_the_own_curve_and_in_the_own_patch(name):
     V, F = zoo.ZOO[name].make()
     mesh = built(V, F, ordered=True)

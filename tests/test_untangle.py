@@ -5,7 +5,15 @@ import naive
 import numpy as np
 import pytest
 import zoo
-from structure import assert_valid, built, faces_of, one_block, referenced
+from structure import (
+    assert_on_reference,
+    assert_valid,
+    built,
+    faces_of,
+    one_block,
+    project,
+    referenced,
+)
 
 from remeshvec._types import FIXED, INNER
 from remeshvec.operations.fit import fit_vertices
@@ -99,6 +107,104 @@ def test_nothing_to_do():
     assert np.array_equal(mesh.X, before)
 
 
+@pytest.mark.parametrize("name", ["cube", "closed_cylinder", "l_prism"])
+def test_curves_stay_and_patches_are_kept(name):
+    """Vertices beside a crease are improved in their own patch."""
+    V, F = zoo.upsampled(*zoo.ZOO[name].make(), n=2, noise=0.0)
+    mesh = built(V, F, ordered=True)
+    reference = referenced(mesh, zoo.mean_edge(V, F), feature_angle=40.0)
+    W, _ = zoo.upsampled(mesh.X[:, :3].copy(), faces_of(mesh).astype(np.int64), n=0, noise=0.3)
+    inner = mesh.kind == INNER
+    mesh.X[inner, :3] = W[inner]
+    before = mesh.X.copy()
+    assert untangled(mesh, reference, 40.0, on_surface=True) > 0
+    moved = (before != mesh.X).any(axis=1)
+    assert (mesh.kind[moved] == INNER).all()
+    assert_on_reference(mesh, reference)
+    assert_valid(mesh)
+
+
+# --- by distance -----------------------------------------------------------------------------
+
+
+def bent():
+    """Coarse torus on a fine one: its faces are off by up to 0.02, its vertices lie on it."""
+    fine = built(*zoo.torus(96, 48), ordered=True)
+    reference = referenced(fine, 0.3)
+    V, F = zoo.torus(24, 12)
+    mesh = built(V, F, ordered=True, length=0.25)
+    project(mesh, reference)
+    return mesh, reference
+
+
+def distances(mesh, reference):
+    """Of the centroids of all faces, squared."""
+    F = faces_of(mesh)
+    R = reference.origin.reshape(-1, 3).astype(np.int64)
+    P = mesh.X[F, :3].mean(axis=1)
+    return igl.point_mesh_squared_distance(P, reference.X[:, :3].copy(), R)[0]
+
+
+THIRD = 1 / 3  # squared circumradius of an equilateral triangle, in squared edges
+
+
+def by_distance(mesh, reference, distance):
+    blocks = one_block(mesh)
+    return untangle_vertices(mesh, blocks, reference.tree, True, THIRD, False, distance)
+
+
+def costs(mesh, reference, distance):
+    """Of every face: its squared distance, or its squared circumradius, against their limits."""
+    V, F = mesh.X[:, :3], faces_of(mesh)
+    sides = np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2)
+    double = np.array([np.linalg.norm(naive.normal(V, f)) for f in F.tolist()])
+    radius = sides.prod(axis=1) / (2 * double)
+    lengths = mesh.X[F, 3].mean(axis=1)
+    return np.maximum(THIRD * distances(mesh, reference) / distance**2, (radius / lengths) ** 2)
+
+
+def test_each_move_brings_its_ring_closer():
+    """One vertex at a time; the largest cost around it falls, and it stays on the surface."""
+    mesh, reference = bent()
+    distance = np.quantile(np.sqrt(distances(mesh, reference)), 0.6)
+    F = faces_of(mesh)
+    bad = np.unique(F[np.sqrt(distances(mesh, reference)) > distance])[:40]
+    count = 0
+    for v in bad:
+        alone, _ = bent()
+        alone.kind[np.arange(len(alone.X)) != v] = FIXED
+        before = costs(alone, reference, distance)[(v == F).any(axis=1)].max()
+        moved = by_distance(alone, reference, distance)
+        after = costs(alone, reference, distance)[(v == F).any(axis=1)].max()
+        count += moved
+        assert after < before if moved else after == before
+        assert (
+            naive.distance_to_mesh(alone.X[v, :3], reference.X[:, :3], near(reference, alone.X[v]))
+            < 1e-12
+        )
+    assert count > 5
+
+
+def near(reference, p):
+    """Faces of the reference around a point."""
+    F = reference.origin.reshape(-1, 3)
+    away = np.linalg.norm(reference.X[F, :3].mean(axis=1) - p[:3], axis=1)
+    return F[np.argsort(away)[:30]]
+
+
+def test_only_rings_that_lie_too_far_away_move():
+    """Whatever their angles and circles are."""
+    mesh, reference = bent()
+    before = mesh.X.copy()
+    assert by_distance(mesh, reference, 1.01 * np.sqrt(distances(mesh, reference).max())) == 0
+    assert np.array_equal(mesh.X, before)
+    limit = np.quantile(np.sqrt(distances(mesh, reference)), 0.9)
+    far = faces_of(mesh)[np.sqrt(distances(mesh, reference)) > limit]
+    assert by_distance(mesh, reference, limit) > 0
+    moved = np.flatnonzero((before != mesh.X).any(axis=1))
+    assert np.isin(moved, far).all()
+
+
 # --- fit -----------------------------------------------------------------------------------------
 
 
@@ -131,6 +237,15 @@ def test_fit_moves_by_no_more_than_its_reach_and_along_normals():
     step = mesh.X[:, :3] - V
     assert np.linalg.norm(step, axis=1) == pytest.approx(0.002)
     assert (step * V).sum(axis=1) == pytest.approx(0.002, rel=1e-2)
+
+
+def test_fit_reaches_as_far_as_the_lengths_say():
+    mesh, reference = coarse_on_fine()
+    mesh.X[:, 3] = lengths = np.random.default_rng(0).uniform(0.5, 2.0, len(mesh.X))
+    V = mesh.X[:, :3].copy()
+    fit_vertices(mesh, one_block(mesh), reference.tree, 0.002, False)
+    assert np.linalg.norm(mesh.X[:, :3] - V, axis=1) == pytest.approx(0.002 * lengths)
+    assert np.array_equal(mesh.X[:, 3], lengths)
 
 
 def test_fit_leaves_boundaries_and_perfect_meshes_alone():

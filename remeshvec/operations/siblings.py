@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._jit import inlined, kernel
-from .._types import DEAD, NONE, IndexArray, Mesh
+from .._types import DEAD, FIXED, NONE, IndexArray, Mesh
 from ..halfedge import following, previous
 from .collapse import COLLAPSED, RING_CAPACITY, CollapseLimits, examine_edge, remove_edge
 
@@ -65,13 +65,17 @@ def _collapse_siblings(mesh, members, group, limits):
 
 @inlined
 def _claim(mesh, faces, n_a, n_b, touched, first, mine):
-    """Mark all vertices around an edge; tells whether a sibling has marked one of them."""
+    """Mark the vertices around an edge; tells whether a sibling has marked one of them.
+
+    Fixed ones do not count: where a seam ends inside a sheet, the rings of both sides hold its tip.
+    """
     met = False
     for side in range(2):
         for i in range(n_a if side == 0 else n_b):
             h = faces[side, i]
             for g in (h, following(h), previous(h)):
                 v = mesh.origin[g]
-                met |= touched[v] >= first and touched[v] < mine
-                touched[v] = mine
+                if mesh.kind[v] != FIXED:
+                    met |= touched[v] >= first and touched[v] < mine
+                    touched[v] = mine
     return met

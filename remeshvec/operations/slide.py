@@ -19,7 +19,7 @@ from .project import Reference, project_curves
 __all__ = ["slide_vertices"]
 
 # Share of the way that a vertex goes. Going all of it at once, two neighbours swap their errors for ever.
-_SHARE = 0.75
+SHARE = 0.75
 
 
 def slide_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
@@ -63,7 +63,7 @@ def _slide(mesh, blocks, X_in, origin, beside, arcs, arc, X, birth):
                 continue
             here = np.int64(birth[v])
             step = _step(mesh, arc, v, u, w, arcs[2, here])
-            h, s = move_on_curve(X_in, origin, beside, arcs, here, arc[v] + _SHARE * step)
+            h, s = move_on_curve(X_in, origin, beside, arcs, here, arc[v] + SHARE * step)
             birth[v] = h
             a = origin[h]
             b = origin[following(h)]
