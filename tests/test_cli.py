@@ -118,9 +118,7 @@ def test_statistics_of_what_json_lacks_are_null(sheet, monkeypatch):
 def test_default_options_are_left_to_the_library(sheet, asked):
     assert main([sheet]) == 0
     assert isinstance(asked[0].pop("callback"), Progress)
-    assert asked == [
-        {"L": None, "preset": "default", "feature_angle": "auto", "boundary": "free"}
-    ]
+    assert asked == [{"L": None, "preset": "default", "feature_angle": "auto", "boundary": "free"}]
 
 
 def test_options_reach_the_library(sheet, asked):

@@ -234,7 +234,9 @@ def test_lines_on_a_sphere_stay(name, L):
     found = np.asarray(result.feature_edges)
     radius = np.linalg.norm(V[edges[0, 0], :2]) if name == "circle" else 1.0
     assert to_segments(result.V[np.unique(found)], V[edges]).max() < ON * 4
-    chord = sag(1.5 * L, radius) + sag(lengths_of(V, edges).max(), radius)  # new ones, and those given
+    chord = sag(1.5 * L, radius) + sag(
+        lengths_of(V, edges).max(), radius
+    )  # new ones, and those given
     assert to_segments(along(result.V[found]), V[edges]).max() < chord
     assert to_segments(along(V[edges]), result.V[found]).max() < chord
     assert_same_graph(result.V, curves_of(found), V, curves_of(edges), 4)
