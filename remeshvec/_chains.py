@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 from ._jit import inlined, kernel
 from ._types import NONE, FloatArray, IndexArray
 
-__all__ = ["CLEAN", "HARD", "STRONG", "SURE", "WEAK", "count_chains", "keep_chains"]
+__all__ = ["BORDER", "CLEAN", "HARD", "STRONG", "SURE", "WEAK", "count_chains", "keep_chains"]
 
 # Classes of candidate edges; each class is all that the smaller ones are.
 WEAK = 1
 STRONG = 2
 SURE = 3
 CLEAN = 4
-HARD = 5  # kept whatever its chain
+HARD = 5  # kept, and its chain with it
+BORDER = 6  # on the boundary: kept, and only that
 
 # A chain bends by at most 45 degrees at a vertex.
 BEND = 0.5**0.5
@@ -58,10 +59,11 @@ def keep_chains(
 ) -> NDArray[np.bool_]:
     """Tell which candidate edges are creases.
 
-    At each vertex the edges that meet are paired, straightest first; linked runs are chains. A chain
-    stays if it has a hard edge, if it is long and has a strong edge, if half of it is sure and no
-    end of it is loose, or if half of it is clean. What is connected stays if it is long in all, or
-    has no loose end and is half sure, or is half clean.
+    The boundary stays. At each vertex the others that meet are paired, straightest first; linked runs
+    are chains. A chain stays if it has a hard edge, if it is long and has a strong edge, if half of it
+    is sure and no end of it is loose, or if half of it is clean. What is connected stays if it is long in
+    all or has a hard edge, or is a third as long, half sure and begins on the boundary, or has no loose
+    end and is half sure, or is half clean.
 
     Parameters
     ----------
@@ -71,7 +73,7 @@ def keep_chains(
     edges : (k,) int64
         One half-edge of every candidate.
     rank : (k,) uint8
-        ``WEAK``, ``STRONG``, ``SURE``, ``CLEAN`` or ``HARD``.
+        ``WEAK``, ``STRONG``, ``SURE``, ``CLEAN``, ``HARD`` or ``BORDER``.
     mean_edge : float
         Of the whole mesh.
 
@@ -80,16 +82,20 @@ def keep_chains(
     (k,) bool
     """
     every = _candidates(X, origin, edges, rank, mean_edge)
-    alive = np.arange(len(edges))
+    kept = rank == BORDER
+    # The boundary lends an end to the others, neither length nor certainty: else every turn beside a
+    # noisy one would stay.
+    is_anchor = np.zeros(every.end.max(initial=-1) + 1, np.bool_)
+    is_anchor[every.end[kept]] = True
+    alive = np.flatnonzero(~kept)
     for _ in range(ROUNDS):
         found = _selected(every, alive)
-        keep = _lasting_chains(found)
+        keep = _lasting_chains(found, is_anchor)
         alive = alive[keep]
         if keep.all():
             break
     found = _selected(every, alive)
-    kept = np.zeros(len(edges), np.bool_)
-    kept[alive[_lasting_components(found)]] = True
+    kept[alive[_lasting_components(found, is_anchor)]] = True
     return kept
 
 
@@ -128,27 +134,32 @@ def _selected(every: Candidates, alive: NDArray[np.intp]) -> Candidates:
     )
 
 
-def _lasting_chains(found: Candidates) -> NDArray[np.bool_]:
+def _lasting_chains(found: Candidates, is_anchor: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell for each edge whether its chain stays."""
     chain = _chains(found)
     is_long = np.bincount(chain, found.targets) >= CHAIN_LENGTH * SLACK
     keep = is_long & _has(found, chain, STRONG)
-    keep |= _is_mostly(found, chain, SURE) & _has_no_loose_end(found, chain)
+    keep |= _is_mostly(found, chain, SURE) & _has_no_loose_end(found, chain, is_anchor)
     keep |= _is_mostly(found, chain, CLEAN, CLEAN_EDGES)
     keep |= _has(found, chain, HARD)
     return keep[chain]
 
 
-def _lasting_components(found: Candidates) -> NDArray[np.bool_]:
-    """Tell for each edge whether it is hard or its component stays."""
+def _lasting_components(found: Candidates, is_anchor: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell for each edge whether its component stays."""
     first, second = np.ascontiguousarray(found.end.T)
     root = np.arange(found.end.max(initial=0) + 1, dtype=np.int32)
     _join(root, first, second)
     component = root[first]
     keep = np.bincount(component, found.targets) >= COMPONENT_LENGTH * SLACK
-    keep |= _is_mostly(found, component, SURE, CLOSED_EDGES) & _has_no_loose_end(found, component)
+    from_border = np.bincount(component, is_anchor[found.end].any(axis=1)) > 0.0
+    is_long = np.bincount(component, found.targets) >= CHAIN_LENGTH * SLACK
+    keep |= from_border & is_long & _is_mostly(found, component, SURE)
+    is_tied = _has_no_loose_end(found, component, is_anchor)
+    keep |= _is_mostly(found, component, SURE, CLOSED_EDGES) & is_tied
     keep |= _is_mostly(found, component, CLEAN, CLEAN_EDGES)
-    return keep[component] | (found.rank == HARD)
+    keep |= _has(found, component, HARD)
+    return keep[component]
 
 
 def _has(found: Candidates, group: IndexArray, rank: int) -> NDArray[np.bool_]:
@@ -166,9 +177,11 @@ def _is_mostly(
     return enough & (np.bincount(group, found.length * is_such) >= half)
 
 
-def _has_no_loose_end(found: Candidates, group: IndexArray) -> NDArray[np.bool_]:
-    """Tell for each group whether no edge of it ends where no other candidate does."""
-    is_loose = np.bincount(found.end.ravel()) == 1
+def _has_no_loose_end(
+    found: Candidates, group: IndexArray, is_anchor: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Tell for each group whether all its edges end at other candidates or on the boundary."""
+    is_loose = (np.bincount(found.end.ravel(), minlength=len(is_anchor)) == 1) & ~is_anchor
     return np.bincount(group, is_loose[found.end].any(axis=1)) == 0.0
 
 

@@ -13,7 +13,7 @@ from math import acos, cos, degrees, radians, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ._chains import CLEAN, HARD, STRONG, SURE, WEAK, count_chains, keep_chains
+from ._chains import BORDER, CLEAN, HARD, STRONG, SURE, WEAK, count_chains, keep_chains
 from ._echo import echoes_beside, face_cosine
 from ._jit import inlined, kernel
 from ._types import MAX_VALENCE, NONE, FloatArray, IndexArray
@@ -131,7 +131,8 @@ def _creases(
         return found
     fixed = _one_of_each(is_hard, twin)
     edges = np.concatenate([fixed, found])
-    rank = np.concatenate([np.full(len(fixed), HARD, np.uint8), rank])
+    hard = np.where(twin[fixed] == NONE, BORDER, HARD).astype(np.uint8)
+    rank = np.concatenate([hard, rank])
     keep = keep_chains(X, origin, edges, rank, _mean_edge(X, origin, twin))[len(fixed) :]
     counts["dropped_short"] = int((~keep).sum())
     return found[keep]

@@ -55,11 +55,11 @@ def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):
 
 @inlined
 def is_flat(nx, ny, nz, longest_squared):
-    """Tell from its vector whether a face is lower than 1e-5 of its longest side.
+    """Tell from its vector whether a face is lower than a thirtieth of its longest side.
 
-    Three points of a straight line are, but for rounding.
+    Three points of a straight line are, and three in a row on a curve that hardly bends.
     """
-    limit = 1e-5 * longest_squared
+    limit = 0.03 * longest_squared
     return nx * nx + ny * ny + nz * nz < limit * limit
 
 

@@ -25,7 +25,7 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import CURVE, DEAD, FIXED, FROZEN, HELD, INNER, NONE, PINNED, SEAM
+from remeshvec._types import CURVE, DEAD, FIXED, FROZEN, HALTED, HELD, INNER, NONE, PINNED, SEAM
 from remeshvec.operations.collapse import (
     COLLAPSED,
     KEPT_CURVE,
@@ -185,7 +185,7 @@ def test_held_vertices_stay_and_swallow(kind):
             assert mesh.kind[held] == kind and np.array_equal(mesh.X[held], place)
 
 
-@pytest.mark.parametrize("flag", [FROZEN, 5 + SEAM])
+@pytest.mark.parametrize("flag", [FROZEN, HALTED, 5 + SEAM])
 def test_frozen_edges_and_seams_do_not_collapse(flag):
     """Seams do in a pass of their own."""
     mesh = crossed()
@@ -197,7 +197,7 @@ def test_frozen_edges_and_seams_do_not_collapse(flag):
     assert_same_bits(mesh, before)
 
 
-@pytest.mark.parametrize("flag", [NONE, 7, 7 + SEAM, FROZEN])
+@pytest.mark.parametrize("flag", [NONE, 7, 7 + SEAM, FROZEN, HALTED])
 @pytest.mark.parametrize("which", ["following", "previous"])
 def test_the_flag_of_either_vanished_edge_is_on_both_sides_of_the_new(which, flag):
     mesh = built(*zoo.grid(9, 8))

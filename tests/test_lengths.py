@@ -200,6 +200,9 @@ def test_sheets_agree_on_lengths_where_they_meet(name):
     np.maximum.at(high, source, found)
     assert np.array_equal(low[source], high[source])
     assert (found <= L[source] * (1 + 1e-12)).all()
+    a, b = np.array(sorted(map(sorted, naive.edges(F)))).T
+    growth = np.abs(low[a] - low[b]) / np.linalg.norm(V[a] - V[b], axis=1)
+    assert growth.max() <= 1.5 * 0.5 / 2.5 * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("gradation", [1.2, 2.0])

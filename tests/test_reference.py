@@ -301,6 +301,37 @@ def test_a_curve_that_crosses_a_seam_on_one_sheet_is_a_junction_of_all():
     assert (mesh.kind[source == v] == FIXED).all()
 
 
+def test_a_sheet_that_leaves_a_seam_smoothly_ends_it():
+    """Four sheets, then three; no sheet has a corner there, and the curves do not turn."""
+    n = 8
+    floor = nonmanifold.sheet([-1, -1, 0], [2, 0, 0], [0, 2, 0], n, n)
+    down = nonmanifold.sheet([-1, 0, -1], [2, 0, 0], [0, 0, 1], n, n // 2)
+    V, F = nonmanifold.sheet([-1, 0, 0], [2, 0, 0], [0, 0, 1], n, n // 2)
+    V[:, 2] += 0.1 * np.maximum(V[:, 0], 0) ** 2
+    W, G = nonmanifold.welded([floor, down, (V, F)])
+    mesh, source = cut_open(W, G)
+    result = featured(mesh, 0.2, vertex_source=source, feature_angle=40.0)
+    assert_built(mesh, result)
+    _, sheets = np.unique(mesh.curve[mesh.curve >= SEAM], return_counts=True)
+    assert set(sheets.tolist()) == {3, 4}
+    middle = (mesh.X[:, :3] == 0).all(axis=1)
+    assert middle.sum() == 4 and (mesh.kind[middle] == FIXED).all()
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_vertex_of_a_seam_that_touches_another_part_stays(closed):
+    """Where a face or a closed part hangs on it by one corner, which slides nowhere."""
+    V, F = nonmanifold.book()
+    v = next(v for v in range(len(V)) if not V[v, :2].any() and np.isclose(V[v, 2], 0.4))
+    n = len(V)
+    W = np.vstack([V, V[v] + [[3, 1, 0], [3, -1, 0], [3, 0, 1]]])
+    part = [[v, n + 1, n], [v, n, n + 2], [v, n + 2, n + 1], [n, n + 1, n + 2]]
+    mesh, source = cut_open(W if closed else W[:-1], np.vstack([F, part if closed else part[:1]]))
+    result = featured(mesh, 0.2, vertex_source=source)
+    assert_built(mesh, result)
+    assert (source == v).sum() == 6 and (mesh.kind[source == v] == FIXED).all()
+
+
 def test_ends_of_seams_are_fixed():
     """A wall that ends inside the floor: there the number of sheets changes."""
     mesh, source = cut_open(*nonmanifold.wall_inside())

@@ -23,7 +23,7 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import CURVE, FIXED, FROZEN, HELD, INNER, NONE, PINNED, SEAM
+from remeshvec._types import CURVE, FIXED, FROZEN, HALTED, HELD, INNER, NONE, PINNED, SEAM
 from remeshvec.operations.split import MAX_ROUNDS, compact, split_edges, split_long_edges
 from remeshvec.polyline import find_siblings
 
@@ -133,20 +133,21 @@ def test_what_is_long_depends_on_the_lengths_at_the_ends():
 # --- frozen edges --------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("flag", [FROZEN, HALTED])
 @pytest.mark.parametrize("factor", [0.45, 0.9])
-def test_frozen_edges_are_never_split(factor):
+def test_frozen_edges_are_never_split(factor, flag):
     mesh = crossed()
     frozen = [half_edge(mesh, 8 * i + 1, 8 * i + 2) for i in (1, 2, 3, 5, 6, 7)]
     frozen += [half_edge(mesh, 8 * 4 + j, 8 * 4 + j + 1) for j in range(3)]  # along a curve
     for h in frozen:
-        mesh.curve[h] = FROZEN
-        mesh.curve[mesh.twin[h]] = FROZEN
+        mesh.curve[h] = flag
+        mesh.curve[mesh.twin[h]] = flag
         mesh.kind[[mesh.origin[h], mesh.origin[next_of(h)]]] = FIXED
     places = {place(mesh, h) for h in frozen}
     refined, count = split_long_edges(mesh, one_block(mesh), factor, False)
     assert count
     assert_valid(refined)
-    still = np.flatnonzero(refined.curve == FROZEN)
+    still = np.flatnonzero(refined.curve == flag)
     assert len(still) == 2 * len(frozen) and {place(refined, h) for h in still} == places
     # All others are as they would be: faces are high enough to have all their long edges split.
     frozen = {frozenset((int(mesh.origin[h]), int(mesh.origin[next_of(h)]))) for h in frozen}
