@@ -163,7 +163,7 @@ class _Notice(event.Listener):
             return
         self.printed = True
         print(
-            "remeshvec: compiling kernels for this machine (once, about 20 s; then cached)",
+            "remeshvec: compiling kernels for this machine (once, about 25 s; then cached)",
             file=sys.stderr,
             flush=True,
         )
