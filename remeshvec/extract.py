@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ._types import FIXED, FROZEN, NONE, FloatArray, Mesh
 from .clean import weld_vertices
 from .constraints import Constraints
+from .halfedge import ends_of
 from .prepare import Prepared
 from .reference import Built
 from .seams import seam_vertices
@@ -116,7 +117,7 @@ def _weld(mesh: Mesh, built: Built) -> tuple[NDArray[np.intp], NDArray[np.int64]
 def _feature_edges(mesh: Mesh, built: Built, new: NDArray[np.int64]) -> IntArray:
     """Edges on curves; of the frozen ones those that were features of the input."""
     h = np.flatnonzero((mesh.curve != NONE) & (mesh.twin < np.arange(len(mesh.twin))))
-    ends = np.stack([mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]])
+    ends = ends_of(mesh.origin, h)
     if (mesh.curve[h] == FROZEN).any():
         at = np.sort(built.reference.origin[mesh.birth[ends]].astype(np.int64), axis=0)
         is_feature = np.isin(at[0] * len(built.reference.X) + at[1], built.feature_keys)

@@ -8,14 +8,15 @@ serves both kinds; every operation keeps it so in O(1).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ._jit import inlined, kernel
 from ._types import CURVE, DEAD, INNER, NONE, FloatArray, IndexArray, Mesh
 
-__all__ = ["BuildReport", "build_mesh", "following", "previous"]
+__all__ = ["BuildReport", "build_mesh", "ends_of", "following", "previous"]
 
 
 @inlined
@@ -28,6 +29,11 @@ def following(h):
 def previous(h):
     """Return the previous half-edge of the same face."""
     return h - 1 if np.uint64(h) % np.uint64(3) != np.uint64(0) else h + 2
+
+
+def ends_of(origin: IndexArray, h: NDArray[Any]) -> IndexArray:
+    """Return the vertices where half-edges start and end, (2, k), from their numbers (k,)."""
+    return origin[np.stack([h, h - h % 3 + (h + 1) % 3])]
 
 
 class BuildReport(NamedTuple):

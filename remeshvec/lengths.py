@@ -15,7 +15,7 @@ from .constraints import Marks
 from .creases import find_creases
 from .errors import MeshInputError, OptionError
 from .geometry import distance_squared, face_vector
-from .halfedge import following
+from .halfedge import ends_of, following
 from .prepare import Prepared
 from .sizing import Adaptive, adaptive_lengths, expected_faces, limit_gradation, target_lengths
 
@@ -86,7 +86,7 @@ def bound_gradation(
     must stay lengths are what these ask for.
     """
     h = np.flatnonzero(mesh.origin != DEAD)
-    a, b = mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]
+    a, b = ends_of(mesh.origin, h)
     frozen = np.zeros(len(mesh.X), np.bool_)
     frozen[a[mesh.curve[h] == FROZEN]] = True
     frozen[b[mesh.curve[h] == FROZEN]] = True

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ._jit import inlined, kernel
 from ._types import NONE, FloatArray, IndexArray
 from .geometry import closest_on_segment, distance_squared
-from .halfedge import following
+from .halfedge import ends_of, following
 
 __all__ = [
     "closest_on_curve",
@@ -74,7 +74,7 @@ def join_edges(
     if not len(edges):
         return np.empty((2, 0), np.int32)
     beside = np.full((2, len(name)), NONE, np.int32)
-    ends = origin[edges], origin[edges - edges % 3 + (edges + 1) % 3]
+    ends = ends_of(origin, edges)
     for side in range(2):
         neighbour = links[1 - side, edges]
         is_open = (neighbour == NONE) | is_corner[ends[side]]
@@ -162,9 +162,7 @@ def find_siblings(
     """
     if not len(candidates):
         return np.empty(0, np.int32), np.zeros(1, np.int32)
-    ends = np.stack(
-        [origin[candidates], origin[candidates - candidates % 3 + (candidates + 1) % 3]]
-    )
+    ends = ends_of(origin, candidates)
     vertices, place = np.unique(ends, return_inverse=True)
     place = place.reshape(2, -1)
     _, same = np.unique(X[vertices, :3] + 0.0, axis=0, return_inverse=True)  # no -0.0
@@ -213,7 +211,7 @@ def closest_on_curve(X, origin, beside, start, x, y, z):
 
 
 @inlined
-def move_on_curve(X, origin, beside, arcs, edge, arc):
+def move_on_curve(beside, arcs, edge, arc):
     """Go along a curve from an edge to an arc length; returns the edge and the parameter there."""
     h = np.int64(edge)
     total = arcs[2, h]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ._types import NONE, FloatArray, IndexArray, Mesh
 from .clean import drop_degenerate_faces, drop_duplicate_faces, weld_vertices
 from .errors import MeshInputError
-from .halfedge import BuildReport, build_mesh
+from .halfedge import BuildReport, build_mesh, ends_of
 from .order import order_mesh
 from .orient import orient_faces
 
@@ -102,7 +102,7 @@ def _count_pinched(connected: _Connected) -> int:
     """Count vertices that hold several fans, but for the ends of edges that were cut."""
     mesh, source = connected.mesh, connected.vertex_source
     h = np.flatnonzero(mesh.twin == NONE)
-    ends = source[np.stack([mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]])]
+    ends = source[ends_of(mesh.origin, h)]
     edges, count = np.unique(np.sort(ends, axis=0), axis=1, return_counts=True)
     vertices, fans = np.unique(source, return_counts=True)
     return len(np.setdiff1d(vertices[fans > 1], edges[:, count > 1]))

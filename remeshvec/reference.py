@@ -18,6 +18,7 @@ from .corners import find_corners
 from .creases import find_creases
 from .curves import link_chains
 from .features import apexes
+from .halfedge import ends_of
 from .operations.project import Reference
 from .polyline import find_siblings, join_edges, measure_arcs, name_edges
 
@@ -94,7 +95,7 @@ def build_reference(
 def _ends(origin: IndexArray, which: NDArray[Any]) -> IndexArray:
     """Both ends of half-edges, given as a mask or as indices."""
     h: NDArray[Any] = np.flatnonzero(which) if which.dtype == np.bool_ else which
-    return origin[np.concatenate([h, h - h % 3 + (h + 1) % 3])]
+    return ends_of(origin, h).ravel()
 
 
 def _edge_keys(origin: IndexArray, which: BoolArray, n: int) -> NDArray[np.int64]:
@@ -140,7 +141,7 @@ def _junctions(
     Elsewhere exactly two edges of curves meet, and every sheet has both.
     """
     edges = np.flatnonzero(name != NONE)
-    ends = np.concatenate([origin[edges], origin[edges - edges % 3 + (edges + 1) % 3]])
+    ends = _ends(origin, edges)
     names = np.concatenate([name[edges], name[edges]])
     per_copy = np.unique(np.stack([ends, names]), axis=1)[0]
     per_source = np.unique(np.stack([vertex_source[ends], names]), axis=1)[0]

@@ -7,6 +7,7 @@ import numpy as np
 from ._types import DEAD, NONE, SEAM, IndexArray, Mesh
 from .clean import weld_vertices
 from .edge_sets import make_blocks
+from .halfedge import ends_of
 from .operations.split import split_edges
 from .polyline import find_siblings
 from .reference import Built
@@ -25,8 +26,7 @@ def seam_vertices(mesh: Mesh, built: Built) -> IndexArray:
     if built.on_seam is None:
         return np.empty(0, np.int32)
     h = np.flatnonzero((mesh.twin == NONE) & (mesh.origin != DEAD))
-    ends = np.concatenate([mesh.origin[h], mesh.origin[h - h % 3 + (h + 1) % 3]])
-    ends = np.unique(ends)
+    ends = np.unique(ends_of(mesh.origin, h))
     return ends[built.on_seam[built.reference.origin[mesh.birth[ends]]]]
 
 

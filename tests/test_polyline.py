@@ -296,7 +296,7 @@ def test_arcs_around_a_loop_with_an_edge_of_no_length():
 @kernel
 def walk(X, origin, beside, arcs, edge, arc, found, parameter):
     for i in range(len(edge)):
-        found[i], parameter[i] = move_on_curve(X, origin, beside, arcs, edge[i], arc[i])
+        found[i], parameter[i] = move_on_curve(beside, arcs, edge[i], arc[i])
 
 
 @pytest.mark.parametrize("name", [*CREASED, "half_discs", "two_cubes", "double_bubble"])

@@ -28,12 +28,12 @@ def slide_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: b
         return
     project_curves(mesh, blocks, reference, parallel)
     arc = np.zeros(mesh.vertex_halfedge.size)
-    _find_arcs(parallel, mesh, blocks, *reference[1:], arc)
+    _find_arcs(parallel, mesh, blocks, reference.X, reference.origin, reference.arcs, arc)
     _slide(parallel, mesh, blocks, *reference[1:], arc, mesh.X, mesh.birth)
 
 
 @driver
-def _find_arcs(mesh, blocks, X_in, origin, beside, arcs, arc):
+def _find_arcs(mesh, blocks, X_in, origin, arcs, arc):
     """Arc length at which each vertex lies on its curve."""
     for k in prange(blocks.vertex.size - 1):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
@@ -63,7 +63,7 @@ def _slide(mesh, blocks, X_in, origin, beside, arcs, arc, X, birth):
                 continue
             here = np.int64(birth[v])
             step = _step(mesh, arc, v, u, w, arcs[2, here])
-            h, s = move_on_curve(X_in, origin, beside, arcs, here, arc[v] + SHARE * step)
+            h, s = move_on_curve(beside, arcs, here, arc[v] + SHARE * step)
             birth[v] = h
             a = origin[h]
             b = origin[following(h)]
