@@ -61,11 +61,21 @@ def make_blocks(mesh: Mesh) -> Blocks:
     vertex = np.zeros(count + 1, np.int64)
     vertex[count] = n_vertices
     for k in range(1, count):
-        h = 3 * int(face[k])
-        while h < mesh.origin.size and mesh.vertex_halfedge[mesh.origin[h]] != h:
-            h += 1
-        vertex[k] = mesh.origin[h] if h < mesh.origin.size else vertex[count]
+        vertex[k] = _first_owned(mesh, 3 * int(face[k]), n_vertices)
     return Blocks(face, np.maximum.accumulate(vertex))
+
+
+def _first_owned(mesh: Mesh, start: int, missing: int) -> int:
+    """Vertex of the first half-edge from ``start`` on that owns one."""
+    step = 64
+    while start < mesh.origin.size:
+        h = np.arange(start, min(start + step, mesh.origin.size))
+        owned = np.flatnonzero(mesh.vertex_halfedge[mesh.origin[h]] == h)
+        if len(owned):
+            return int(mesh.origin[h[owned[0]]])
+        start += step
+        step *= 8
+    return missing
 
 
 def stages(blocks: Blocks) -> tuple[int, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from math import cos, radians
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from .operations.project import locate_vertices, project_vertices, read_lengths
 from .operations.relax import relax_vertices
 from .operations.siblings import collapse_siblings
 from .operations.slide import slide_vertices
-from .operations.split import MAX_ROUNDS, compact, split_edges, split_long_edges
+from .operations.split import MAX_ROUNDS, ROOM, compact, split_edges, split_long_edges
 from .operations.unfold import undo_folds
 from .operations.untangle import untangle_vertices
 from .options import Options
@@ -63,6 +63,9 @@ _CENTROID_SHARE = 0.84
 _SAMPLE_SHARE = 1.0
 _ROUGH = 0.05
 
+# Collapses leave holes. Above this share of the faces they are closed, because every loop reads them.
+_SPARSE = 0.25
+
 # Sweeps, counted from the last one as 1, after which lengths are compared with what they led to.
 _FEEDBACK = (7, 5, 3)
 
@@ -74,6 +77,16 @@ _REFINEMENTS = 3
 # So many sweeps that split and collapse about as many edges, and below this share of all, go in circles.
 _CYCLE = 4
 _CALM = 0.05
+
+
+class _Changed(NamedTuple):
+    """A mesh after some phases."""
+
+    mesh: Mesh
+    blocks: Blocks
+    # Root mean square of the moves of all vertices, in target lengths. Their maximum never comes down:
+    # wherever a single edge is flipped, vertices move.
+    step: float
 
 
 class Sweeps:
@@ -119,8 +132,8 @@ class Sweeps:
             if self.guard is not None:
                 mesh = compact(mesh, blocks, self.is_parallel(mesh.origin.size // 3))
                 blocks = make_blocks(mesh)
-            mesh, step = self._guarded(
-                mesh, partial(self._change, blocks=blocks, built=built, sweep=sweep, varies=varies)
+            mesh, blocks, step = self._guarded(
+                mesh, blocks, partial(self._change, built=built, sweep=sweep, varies=varies)
             )
             if self.stop == "cancelled" or self._has_converged(mesh, step):
                 break
@@ -163,47 +176,44 @@ class Sweeps:
         distance = self.options.max_deviation * self.scale
         return DeviationGuard(built, distance, self.is_parallel(mesh.origin.size // 3))
 
-    def _guarded(self, mesh: Mesh, change: Callable[[Mesh], float]) -> tuple[Mesh, float]:
-        """Change a mesh; where that leads too far from the input, hold the mesh there and try again.
-
-        Returns the mesh and what ``change`` returned.
-        """
+    def _guarded(
+        self, mesh: Mesh, blocks: Blocks, change: Callable[[Mesh, Blocks], _Changed]
+    ) -> _Changed:
+        """Change a mesh; where that leads too far from the input, hold the mesh there and try again."""
         if self.guard is None:
-            return mesh, change(mesh)
+            return change(mesh, blocks)
         with self.watch.time("deviation"):
             self.guard.remember(mesh)
         counts = self.counts[-1].copy()
         for attempt in range(_ATTEMPTS):
-            trial = mesh.copy()
             self.counts[-1] = counts.copy()
-            result = change(trial)
+            trial = change(mesh.copy(), blocks)
             with self.watch.time("deviation"):
-                offenders = self.guard.offenders(trial)
+                offenders = self.guard.offenders(trial.mesh)
                 if not len(offenders):
-                    self.guard.release(trial)
-                    return trial, result
+                    self.guard.release(trial.mesh)
+                    return trial
                 self.guard.hold(mesh, offenders, attempt)
         self.guard.release(mesh)
         self.counts[-1] = counts | {"collapse": 0, "flip": 0}
-        return mesh, np.inf
+        return _Changed(mesh, blocks, np.inf)
 
-    def _change(self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, varies: bool) -> float:
-        """Run the phases that change the mesh in place.
-
-        Returns the root mean square of the steps of all vertices, in target lengths. Their maximum
-        never comes down: wherever a single edge is flipped, vertices move.
-        """
-        self._connect(mesh, blocks, built, sweep)
+    def _change(
+        self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, varies: bool
+    ) -> _Changed:
+        """Run the phases that change the mesh in place."""
+        mesh, blocks = self._connect(mesh, blocks, built, sweep)
         if self.stop == "cancelled":
-            return np.inf
+            return _Changed(mesh, blocks, np.inf)
         before = mesh.X[:, :3].copy() if self.options.tol is not None else None
         self._move(mesh, blocks, built, sweep, varies)
         self._is_cancelled(sweep, "relax")
         if before is None:
-            return np.inf
+            return _Changed(mesh, blocks, np.inf)
         alive = mesh.vertex_halfedge != DEAD
-        step = mesh.X[alive, :3] - before[alive]
-        return float(np.sqrt(((step * step).sum(axis=1) / mesh.X[alive, 3] ** 2).mean()))
+        move = mesh.X[alive, :3] - before[alive]
+        step = float(np.sqrt(((move * move).sum(axis=1) / mesh.X[alive, 3] ** 2).mean()))
+        return _Changed(mesh, blocks, step)
 
     def _split(
         self, mesh: Mesh, blocks: Blocks, built: Built, factor: float
@@ -214,15 +224,18 @@ class Sweeps:
             for _ in range(MAX_ROUNDS):
                 parallel = self.is_parallel(mesh.origin.size // 3)
                 siblings = None if built.on_seam is None else find_seams(mesh)
-                mesh, n_split = split_long_edges(mesh, blocks, factor, parallel, siblings)
+                refined, n_split = split_long_edges(mesh, blocks, factor, parallel, siblings)
                 if not n_split:
                     break
-                blocks = make_blocks(mesh)
+                if refined is not mesh:
+                    mesh, blocks = refined, make_blocks(refined)
                 count += n_split
         self.counts[-1]["split"] = count
         return mesh, blocks
 
-    def _connect(self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int) -> None:
+    def _connect(
+        self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int
+    ) -> tuple[Mesh, Blocks]:
         """Collapse and flip."""
         options = self.options
         parallel = self.is_parallel(mesh.origin.size // 3)
@@ -239,7 +252,15 @@ class Sweeps:
             if built.on_seam is not None:
                 self.counts[-1]["collapse"] += collapse_siblings(mesh, *find_seams(mesh), limits)
         if self._is_cancelled(sweep, "collapse"):
-            return
+            return mesh, blocks
+        n_faces = mesh.origin.size // 3
+        with self.watch.time("collapse"):
+            # Only where this sweep made holes: to count them is a pass over all faces.
+            if 8 * self.counts[-1]["collapse"] > n_faces:
+                if np.count_nonzero(mesh.origin[::3] == DEAD) > _SPARSE * n_faces:
+                    mesh = compact(mesh, blocks, parallel, ROOM)
+                    blocks = make_blocks(mesh)
+                    parallel = self.is_parallel(mesh.origin.size // 3)
         flips = FlipLimits(
             cos(radians(options.flip_normal)), options.delaunay_ties, options.sliver_check
         )
@@ -248,6 +269,7 @@ class Sweeps:
                 tally = flip_edges(mesh, blocks, flips, parallel)
                 self.counts[-1]["flip"] = self.counts[-1].get("flip", 0) + int(tally[0])
         self._is_cancelled(sweep, "flip")
+        return mesh, blocks
 
     def _move(self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, varies: bool) -> None:
         """Relax and project."""
@@ -281,8 +303,8 @@ class Sweeps:
                 mesh = separate_sheets(mesh, built)
             blocks = make_blocks(mesh)
         with self.watch.time("finish"):
-            mesh, _ = self._guarded(
-                mesh, partial(self._polish, blocks=blocks, built=built, parallel=parallel)
+            mesh, blocks, _ = self._guarded(
+                mesh, blocks, partial(self._polish, built=built, parallel=parallel)
             )
             if self.tolerance is not None:
                 mesh = self._refine(mesh, built, self.tolerance)
@@ -302,7 +324,7 @@ class Sweeps:
             barycentric = locate_vertices(mesh, blocks, reference, trust, parallel)
         return mesh, barycentric
 
-    def _polish(self, mesh: Mesh, blocks: Blocks, built: Built, parallel: bool) -> float:
+    def _polish(self, mesh: Mesh, blocks: Blocks, built: Built, parallel: bool) -> _Changed:
         """Move vertices for the last time."""
         options, tree = self.options, built.reference.tree
         if options.project:
@@ -314,7 +336,7 @@ class Sweeps:
             untangle_vertices(mesh, blocks, tree, options.project, cosine, parallel)
         for _ in range(options.fit_rounds):
             fit_vertices(mesh, blocks, tree, _FIT_REACH, parallel)
-        return 0.0
+        return _Changed(mesh, blocks, 0.0)
 
     def _refine(self, mesh: Mesh, built: Built, tolerance: float) -> Mesh:
         """Bring all faces within a tolerance of the input.

@@ -12,15 +12,24 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import prange
+from numpy.typing import NDArray
 
 from .._jit import driver, inlined
-from .._types import CURVE, DEAD, FROZEN, INNER, NONE, SEAM, Blocks, Mesh
+from .._types import CURVE, DEAD, FROZEN, INNER, NONE, SEAM, Blocks, FloatArray, Mesh
 from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
-from ..geometry import SHARP, distance_squared, face_vector
+from ..geometry import SHARP, distance_squared
 from ..halfedge import following, previous
 from .guards import folds_over, keeps_curves, keeps_link, makes_sliver, overshoots
 
-__all__ = ["COLLAPSED", "CollapseLimits", "collapse_short_edges", "examine_edge", "remove_edge"]
+__all__ = [
+    "COLLAPSED",
+    "CollapseLimits",
+    "Rings",
+    "collapse_short_edges",
+    "examine_edge",
+    "make_rings",
+    "remove_edge",
+]
 
 # Outcomes of one candidate, and columns of the tally.
 COLLAPSED = 0
@@ -44,6 +53,25 @@ _REGULARISER = 0.03
 # Along a curve the sheets on all sides must agree. Their own edges may become longer by this factor,
 # and are split by the next sweep: otherwise one long edge somewhere keeps a curve of short ones.
 _CURVE_SLACK = 1.5
+
+
+class Rings(NamedTuple):
+    """Scratch: the closed one-rings of both ends of an edge, one row each."""
+
+    face: NDArray[np.int64]  # (2, k) outgoing half-edges of the end
+    vertex: NDArray[np.int64]  # (2, k) ring vertices; one more than faces around a boundary vertex
+    point: FloatArray  # (2, k, 4) their coordinates and target lengths
+    normal: FloatArray  # (2, k, 4) area vectors of the faces and their lengths
+
+
+def make_rings() -> Rings:
+    """Allocate."""
+    return Rings(
+        np.empty((2, RING_CAPACITY), np.int64),
+        np.empty((2, RING_CAPACITY), np.int64),
+        np.empty((2, RING_CAPACITY, 4)),
+        np.empty((2, RING_CAPACITY, 4)),
+    )
 
 
 class CollapseLimits(NamedTuple):
@@ -113,9 +141,12 @@ def _collapse(mesh, blocks, stage, limits, candidates, count, tally):
     for k in prange(stage_blocks(blocks, stage)):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
-        faces = np.empty((2, RING_CAPACITY), np.int64)
-        ring = np.empty((2, RING_CAPACITY), np.int64)
-        normals = np.empty((2, RING_CAPACITY, 4))
+        rings = Rings(
+            np.empty((2, RING_CAPACITY), np.int64),
+            np.empty((2, RING_CAPACITY), np.int64),
+            np.empty((2, RING_CAPACITY, 4)),
+            np.empty((2, RING_CAPACITY, 4)),
+        )
         for j in range(first, end):
             for i in range(3 * blocks.face[j], 3 * blocks.face[j] + count[j]):
                 h = np.int64(candidates[i])
@@ -124,169 +155,183 @@ def _collapse(mesh, blocks, stage, limits, candidates, count, tally):
                 v = mesh.origin[h]
                 if v < low or v >= high:  # another block's, or DEAD
                     continue
-                outcome = _collapse_edge(mesh, h, low, high, limits, faces, ring, normals)
+                outcome = _collapse_edge(mesh, h, low, high, limits, rings)
                 tally[k, outcome] += 1
                 if outcome != OUTSIDE:
                     candidates[i] = DONE
 
 
 @inlined
-def _collapse_edge(mesh, h, low, high, limits, faces, ring, normals):
+def _collapse_edge(mesh, h, low, high, limits, rings):
     """Collapse one edge if every guard agrees; returns the outcome."""
     c = mesh.curve[h]
     if c >= SEAM:
         return KEPT_CURVE
-    outcome, x, y, z, s, n_a, n_b = examine_edge(mesh, h, low, high, limits, faces, ring, normals)
+    outcome, x, y, z, s, n_a, n_b = examine_edge(mesh, h, low, high, limits, rings)
     if outcome == COLLAPSED:
-        remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b)
+        remove_edge(mesh, h, x, y, z, s, rings.face, n_a, n_b)
     return outcome
 
 
 @inlined
-def examine_edge(mesh, h, low, high, limits, faces, ring, normals):
-    """Ask every guard; returns the outcome, the new position and length, and the faces of both rings."""
+def examine_edge(mesh, h, low, high, limits, rings):
+    """Ask every guard, those first that refuse most for least.
+
+    Returns the outcome, the new position and length, and the number of faces of both rings.
+    """
+    X = mesh.X
     a = np.int64(mesh.origin[h])
     b = np.int64(mesh.origin[following(h)])
     if b < low or b >= high:
         return OUTSIDE, 0.0, 0.0, 0.0, 0.0, 0, 0
-    length = distance_squared(mesh.X, a, b)
-    if not is_short(length, mesh.X[a, 3], mesh.X[b, 3], limits.shortest):
+    length = distance_squared(X, a, b)
+    if not is_short(length, X[a, 3], X[b, 3], limits.shortest):
         return GONE, 0.0, 0.0, 0.0, 0.0, 0, 0
     if not keeps_curves(mesh, h, a, b):
         return KEPT_CURVE, 0.0, 0.0, 0.0, 0.0, 0, 0
-    n_a, m_a = walk_ring(mesh, a, low, high, faces[0], ring[0])
-    n_b, m_b = walk_ring(mesh, b, low, high, faces[1], ring[1])
-    if n_a == 0 or n_b == 0:
-        return OUTSIDE, 0.0, 0.0, 0.0, 0.0, 0, 0
-    if n_a < 0 or n_b < 0:
-        return KEPT_LINK, 0.0, 0.0, 0.0, 0.0, 0, 0
-    if not keeps_link(mesh, h, ring[0], n_a, m_a, ring[1], n_b, m_b):
-        return KEPT_LINK, 0.0, 0.0, 0.0, 0.0, 0, 0
-    sharp_a = _measure_normals(mesh, faces[0], n_a, normals[0])
-    sharp_b = _measure_normals(mesh, faces[1], n_b, normals[1])
-    x, y, z, s = _position(
-        mesh, a, b, sharp_a, sharp_b, limits.quadric_reach, faces, n_a, n_b, normals
-    )
-    half = 0.5 * limits.longest
-    cosine = limits.foldover_cosine
+    # Three quarters of all candidates overshoot. Whether they do can be seen on the way around the ring,
+    # from the midpoint, before anything else is computed.
     kind = max(mesh.kind[a], mesh.kind[b])
-    outcome = COLLAPSED
+    x, y, z, s = _meeting_point(mesh, a, b, False, False)
+    half = 0.5 * limits.longest
     slack = _CURVE_SLACK if min(mesh.kind[a], mesh.kind[b]) == CURVE else 1.0
-    if overshoots(mesh, x, y, z, s, b, ring[0], m_a, half, slack) or overshoots(
-        mesh, x, y, z, s, a, ring[1], m_b, half, slack
-    ):
-        outcome = KEPT_OVERSHOOT
-    elif folds_over(mesh, x, y, z, kind, b, faces[0], n_a, normals[0], cosine) or folds_over(
-        mesh, x, y, z, kind, a, faces[1], n_b, normals[1], cosine
+    n_a, m_a = _survey_ring(mesh, a, b, x, y, z, s, low, high, half, slack, rings, 0)
+    if n_a <= 0:
+        return -n_a, 0.0, 0.0, 0.0, 0.0, 0, 0
+    n_b, m_b = _survey_ring(mesh, b, a, x, y, z, s, low, high, half, slack, rings, 1)
+    if n_b <= 0:
+        return -n_b, 0.0, 0.0, 0.0, 0.0, 0, 0
+    if not keeps_link(mesh, h, rings.vertex, n_a, m_a, n_b, m_b):
+        return KEPT_LINK, 0.0, 0.0, 0.0, 0.0, 0, 0
+    sharp_a = _measure_normals(rings, 0, n_a, m_a, X[a, 0], X[a, 1], X[a, 2])
+    sharp_b = _measure_normals(rings, 1, n_b, m_b, X[b, 0], X[b, 1], X[b, 2])
+    if kind == INNER and (sharp_a != sharp_b or limits.quadric_reach > 0.0):
+        x, y, z, s = _meeting_point(mesh, a, b, sharp_a, sharp_b)
+        if sharp_a == sharp_b:
+            x, y, z = _quadric_point(mesh, x, y, z, limits.quadric_reach * s, rings, n_a, n_b)
+        if overshoots(rings, 0, m_a, x, y, z, s, b, half) or overshoots(
+            rings, 1, m_b, x, y, z, s, a, half
+        ):
+            return KEPT_OVERSHOOT, 0.0, 0.0, 0.0, 0.0, 0, 0
+    outcome = COLLAPSED
+    cosine = limits.foldover_cosine
+    if folds_over(mesh, x, y, z, kind, b, rings, 0, n_a, m_a, cosine) or folds_over(
+        mesh, x, y, z, kind, a, rings, 1, n_b, m_b, cosine
     ):
         outcome = KEPT_FOLDOVER
-    elif limits.sliver_check and makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
+    elif limits.sliver_check and makes_sliver(mesh, x, y, z, a, b, rings.face, n_a, n_b):
         outcome = KEPT_SLIVER
     return outcome, x, y, z, s, n_a, n_b
 
 
 @inlined
-def walk_ring(mesh, v, low, high, faces, ring):
-    """List outgoing half-edges and ring vertices of ``v``.
+def _survey_ring(mesh, v, other, x, y, z, s, low, high, half_factor, slack, rings, side):
+    """List outgoing half-edges and ring vertices of ``v``, with their coordinates.
 
-    Returns both counts; (0, 0) where a ring vertex lies outside the range, (-1, -1) where there are
-    too many. Only faces at ``v`` are read, which no other block can change.
+    Returns both counts; instead of the first minus the outcome where a ring vertex lies outside the
+    range, where there are too many, or where an edge from (x, y, z) to the ring would be too long for
+    the length ``s`` there (edges to inner vertices may be longer by ``slack``). Only faces at ``v`` are
+    read, which no other block can change.
     """
+    X = mesh.X
     start = np.int64(mesh.vertex_halfedge[v])
     h = start
     for i in range(RING_CAPACITY - 1):
-        w = np.int64(mesh.origin[following(h)])
+        at_end = h == NONE
+        if at_end:  # the last vertex around a boundary vertex starts no face at it
+            w = np.int64(mesh.origin[previous(rings.face[side, i - 1])])
+        else:
+            rings.face[side, i] = h
+            w = np.int64(mesh.origin[following(h)])
         if w < low or w >= high:
-            return 0, 0
-        faces[i] = h
-        ring[i] = w
-        p = previous(h)
-        t = np.int64(mesh.twin[p])
-        if t == NONE:
-            w = np.int64(mesh.origin[p])
-            if w < low or w >= high:
-                return 0, 0
-            ring[i + 1] = w
-            return i + 1, i + 2
-        if t == start:
+            return -OUTSIDE, 0
+        px, py, pz = X[w, 0], X[w, 1], X[w, 2]
+        dx, dy, dz = px - x, py - y, pz - z
+        limit = half_factor * (s + X[w, 3])
+        if slack != 1.0 and mesh.kind[w] == INNER:
+            limit *= slack
+        if w != other and dx * dx + dy * dy + dz * dz > limit * limit:
+            return -KEPT_OVERSHOOT, 0
+        rings.vertex[side, i] = w
+        rings.point[side, i, 0], rings.point[side, i, 1] = px, py
+        rings.point[side, i, 2], rings.point[side, i, 3] = pz, X[w, 3]
+        if at_end:
+            return i, i + 1
+        h = np.int64(mesh.twin[previous(h)])
+        if h == start:
             return i + 1, i + 1
-        h = t
-    return -1, -1
+    return -KEPT_LINK, 0
 
 
 @inlined
-def _measure_normals(mesh, faces, n, normals):
-    """Area vectors of a ring's faces and their lengths; tells whether the vertex is sharp.
+def _measure_normals(rings, side, n, m, x, y, z):
+    """Area vectors of the faces around (x, y, z) and their lengths; tells whether the vertex is sharp.
 
     Sharp: the normals cancel, as on the rim of a sheet.
     """
-    X = mesh.X
     sx = sy = sz = total = 0.0
+    point = rings.point
+    ux, uy, uz = point[side, 0, 0] - x, point[side, 0, 1] - y, point[side, 0, 2] - z
     for i in range(n):
-        h = faces[i]
-        u = mesh.origin[h]
-        v = mesh.origin[following(h)]
-        w = mesh.origin[previous(h)]
-        nx, ny, nz = face_vector(
-            X[u, 0], X[u, 1], X[u, 2], X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2]
-        )
+        j = i + 1 if i + 1 < m else 0
+        wx, wy, wz = point[side, j, 0] - x, point[side, j, 1] - y, point[side, j, 2] - z
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
         length = sqrt(nx * nx + ny * ny + nz * nz)
-        normals[i, 0], normals[i, 1], normals[i, 2], normals[i, 3] = nx, ny, nz, length
+        rings.normal[side, i, 0], rings.normal[side, i, 1] = nx, ny
+        rings.normal[side, i, 2], rings.normal[side, i, 3] = nz, length
         sx += nx
         sy += ny
         sz += nz
         total += length
+        ux, uy, uz = wx, wy, wz
     return sx * sx + sy * sy + sz * sz < SHARP * SHARP * total * total
 
 
 @inlined
-def _position(mesh, a, b, sharp_a, sharp_b, reach, faces, n_a, n_b, normals):
-    """Where the two ends meet: at the more constrained or sharper one, else midpoint or quadric.
+def _meeting_point(mesh, a, b, sharp_a, sharp_b):
+    """Where the two ends meet: at the more constrained or sharper one, else in the middle.
 
     The target length there comes last.
     """
     X = mesh.X
-    is_inner = mesh.kind[a] == INNER and mesh.kind[b] == INNER
-    if mesh.kind[a] > mesh.kind[b] or (is_inner and sharp_a and not sharp_b):
+    if mesh.kind[a] > mesh.kind[b] or (sharp_a and not sharp_b):
         return X[a, 0], X[a, 1], X[a, 2], X[a, 3]
-    if mesh.kind[b] > mesh.kind[a] or (is_inner and sharp_b and not sharp_a):
+    if mesh.kind[b] > mesh.kind[a] or (sharp_b and not sharp_a):
         return X[b, 0], X[b, 1], X[b, 2], X[b, 3]
-    x = 0.5 * (X[a, 0] + X[b, 0])
-    y = 0.5 * (X[a, 1] + X[b, 1])
-    z = 0.5 * (X[a, 2] + X[b, 2])
-    s = 0.5 * (X[a, 3] + X[b, 3])
-    if reach > 0.0 and is_inner:
-        x, y, z = _quadric_point(mesh, x, y, z, reach * s, faces, n_a, n_b, normals)
-    return x, y, z, s
+    return (
+        0.5 * (X[a, 0] + X[b, 0]),
+        0.5 * (X[a, 1] + X[b, 1]),
+        0.5 * (X[a, 2] + X[b, 2]),
+        0.5 * (X[a, 3] + X[b, 3]),
+    )
 
 
 @inlined
-def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b, normals):
+def _quadric_point(mesh, x, y, z, reach, rings, n_a, n_b):
     """Point closest to the planes of both rings, weighted by area [Garland and Heckbert 1997]."""
     xx = xy = xz = yy = yz = zz = gx = gy = gz = weight = 0.0
     X = mesh.X
     for side in range(2):
         # All planes of a ring pass through its centre.
-        v = mesh.origin[faces[side, 0]]
+        v = mesh.origin[rings.face[side, 0]]
         dx, dy, dz = x - X[v, 0], y - X[v, 1], z - X[v, 2]
         for i in range(n_a if side == 0 else n_b):
-            norm = normals[side, i, 3]
+            norm = rings.normal[side, i, 3]
             if norm == 0.0:
                 continue
-            nx, ny, nz = normals[side, i, 0], normals[side, i, 1], normals[side, i, 2]
+            nx, ny, nz = rings.normal[side, i, 0], rings.normal[side, i, 1], rings.normal[side, i, 2]
             weight += norm
-            height = (nx * dx + ny * dy + nz * dz) / norm
+            nx_unit, ny_unit, nz_unit = nx / norm, ny / norm, nz / norm
+            height = nx_unit * dx + ny_unit * dy + nz_unit * dz
             gx -= nx * height
             gy -= ny * height
             gz -= nz * height
-            nx_unit = nx / norm
-            ny_unit = ny / norm
             xx += nx * nx_unit
             xy += ny * nx_unit
             xz += nz * nx_unit
             yy += ny * ny_unit
             yz += nz * ny_unit
-            zz += nz * nz / norm
+            zz += nz * nz_unit
     if weight == 0.0:
         return x, y, z
     pull = _REGULARISER * weight
@@ -296,10 +341,10 @@ def _quadric_point(mesh, x, y, z, reach, faces, n_a, n_b, normals):
     c0 = yy * zz - yz * yz
     c1 = xz * yz - xy * zz
     c2 = xy * yz - xz * yy
-    determinant = xx * c0 + xy * c1 + xz * c2
-    dx = (c0 * gx + c1 * gy + c2 * gz) / determinant
-    dy = (c1 * gx + (xx * zz - xz * xz) * gy + (xy * xz - xx * yz) * gz) / determinant
-    dz = (c2 * gx + (xy * xz - xx * yz) * gy + (xx * yy - xy * xy) * gz) / determinant
+    scale = 1.0 / (xx * c0 + xy * c1 + xz * c2)
+    dx = (c0 * gx + c1 * gy + c2 * gz) * scale
+    dy = (c1 * gx + (xx * zz - xz * xz) * gy + (xy * xz - xx * yz) * gz) * scale
+    dz = (c2 * gx + (xy * xz - xx * yz) * gy + (xx * yy - xy * xy) * gz) * scale
     length = sqrt(dx * dx + dy * dy + dz * dz)
     if not length < np.inf:
         return x, y, z

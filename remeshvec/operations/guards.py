@@ -1,7 +1,7 @@
 """Guards of a collapse: each says of one thing whether the mesh would be worse off.
 
-A collapse moves the ends a and b of an edge to one place. `faces` lists the outgoing half-edges of an
-end, `ring` its ring vertices, `normals` the area vectors of its faces and their lengths.
+A collapse moves the ends a and b of an edge to one place. Row 0 of `Rings` is the ring of a, row 1 that
+of b.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def joins_curves(mesh, h):
 
 
 @inlined
-def keeps_link(mesh, h, ring_a, n_a, m_a, ring_b, n_b, m_b):
+def keeps_link(mesh, h, ring, n_a, m_a, n_b, m_b):
     """Guard: the link condition, link(a) and link(b) meet in link(ab) only.
 
     [Dey et al. 1999]: the common neighbours are the apexes of the edge's faces, and a tetrahedron,
@@ -52,53 +52,54 @@ def keeps_link(mesh, h, ring_a, n_a, m_a, ring_b, n_b, m_b):
     common = 0
     for i in range(m_a):
         for j in range(m_b):
-            if ring_a[i] == ring_b[j]:
-                common += 1
+            common += ring[0, i] == ring[1, j]
     if mesh.twin[h] == NONE:
         return common == 1
     return common == 2 and not (n_a == 3 and m_a == 3 and n_b == 3 and m_b == 3)
 
 
 @inlined
-def overshoots(mesh, x, y, z, s, other, ring, m, half_factor, slack):
-    """Guard: an edge from the new position to the ring would be too long for the length ``s`` there.
-
-    Edges to inner vertices may be longer by ``slack``.
-    """
-    X = mesh.X
+def overshoots(rings, side, m, x, y, z, s, other, half_factor):
+    """Guard: an edge from the new position to the ring would be too long for the length ``s`` there."""
     for i in range(m):
-        w = ring[i]
-        dx = X[w, 0] - x
-        dy = X[w, 1] - y
-        dz = X[w, 2] - z
-        limit = half_factor * (s + X[w, 3])
-        if slack != 1.0 and mesh.kind[w] == INNER:
-            limit *= slack
-        if w != other and dx * dx + dy * dy + dz * dz > limit * limit:
+        dx = rings.point[side, i, 0] - x
+        dy = rings.point[side, i, 1] - y
+        dz = rings.point[side, i, 2] - z
+        limit = half_factor * (s + rings.point[side, i, 3])
+        if rings.vertex[side, i] != other and dx * dx + dy * dy + dz * dz > limit * limit:
             return True
     return False
 
 
 @inlined
-def folds_over(mesh, x, y, z, kind, other, faces, n, normals, cosine):
+def folds_over(mesh, x, y, z, kind, other, rings, side, n, m, cosine):
     """Guard: a face that stays would turn its normal too far, or lose its area.
 
     ``kind`` is that of the vertex that stays. On a curve, faces whose corners all lie on curves may
     become flat along a straight one, with a normal that is rounding.
     """
-    X = mesh.X
+    point = rings.point
+    normal = rings.normal
     for i in range(n):
-        v = mesh.origin[following(faces[i])]
-        w = mesh.origin[previous(faces[i])]
+        j = i + 1 if i + 1 < m else 0
+        v = rings.vertex[side, i]
+        w = rings.vertex[side, j]
         if v == other or w == other:
             continue
-        nx, ny, nz = face_vector(x, y, z, X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2])
-        if normals[i, 3] == 0.0:
+        nx, ny, nz = face_vector(
+            x, y, z,
+            point[side, i, 0], point[side, i, 1], point[side, i, 2],
+            point[side, j, 0], point[side, j, 1], point[side, j, 2],
+        )  # fmt: skip
+        if normal[side, i, 3] == 0.0:
             if nx == 0.0 and ny == 0.0 and nz == 0.0:
                 return True
-        elif turn_exceeds(normals[i, 0], normals[i, 1], normals[i, 2], nx, ny, nz, cosine):
+        elif turn_exceeds(
+            normal[side, i, 0], normal[side, i, 1], normal[side, i, 2], nx, ny, nz, cosine
+        ):
             return True
         if kind >= CURVE and mesh.kind[v] >= CURVE and mesh.kind[w] >= CURVE:
+            X = mesh.X
             longest = max(
                 distance_squared(X, v, w),
                 (X[v, 0] - x) ** 2 + (X[v, 1] - y) ** 2 + (X[v, 2] - z) ** 2,

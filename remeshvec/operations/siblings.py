@@ -11,7 +11,7 @@ import numpy as np
 from .._jit import inlined, kernel
 from .._types import DEAD, FIXED, NONE, IndexArray, Mesh
 from ..halfedge import following, previous
-from .collapse import COLLAPSED, RING_CAPACITY, CollapseLimits, examine_edge, remove_edge
+from .collapse import COLLAPSED, CollapseLimits, examine_edge, make_rings, remove_edge
 
 __all__ = ["collapse_siblings"]
 
@@ -28,14 +28,11 @@ def collapse_siblings(
     group : (g + 1,) int32
         Where the groups start.
     """
-    return int(_collapse_siblings(mesh, members, group, limits))
+    return int(_collapse_siblings(mesh, members, group, limits, make_rings()))
 
 
 @kernel
-def _collapse_siblings(mesh, members, group, limits):
-    faces = np.empty((2, RING_CAPACITY), np.int64)
-    ring = np.empty((2, RING_CAPACITY), np.int64)
-    normals = np.empty((2, RING_CAPACITY, 4))
+def _collapse_siblings(mesh, members, group, limits, rings):
     touched = np.full(mesh.vertex_halfedge.size, NONE, np.int32)
     end = np.int64(mesh.vertex_halfedge.size)
     done = 0
@@ -46,11 +43,9 @@ def _collapse_siblings(mesh, members, group, limits):
             if mesh.origin[h] == DEAD:
                 agreed = False
                 break
-            outcome, _, _, _, _, n_a, n_b = examine_edge(
-                mesh, h, 0, end, limits, faces, ring, normals
-            )
+            outcome, _, _, _, _, n_a, n_b = examine_edge(mesh, h, 0, end, limits, rings)
             # Where the rings of two siblings meet, on one sheet that meets itself, all stay.
-            if outcome != COLLAPSED or _claim(mesh, faces, n_a, n_b, touched, group[g], i):
+            if outcome != COLLAPSED or _claim(mesh, rings.face, n_a, n_b, touched, group[g], i):
                 agreed = False
                 break
         if not agreed:
@@ -58,8 +53,8 @@ def _collapse_siblings(mesh, members, group, limits):
         done += 1
         for i in range(group[g], group[g + 1]):
             h = np.int64(members[i])
-            _, x, y, z, s, n_a, n_b = examine_edge(mesh, h, 0, end, limits, faces, ring, normals)
-            remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b)
+            _, x, y, z, s, n_a, n_b = examine_edge(mesh, h, 0, end, limits, rings)
+            remove_edge(mesh, h, x, y, z, s, rings.face, n_a, n_b)
     return done
 
 

@@ -13,27 +13,22 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined, kernel
-from .._types import (
-    CURVE,
-    DEAD,
-    FIXED,
-    FROZEN,
-    HELD,
-    INNER,
-    NONE,
-    SEAM,
-    Blocks,
-    IndexArray,
-    Mesh,
-)
+from .._types import CURVE, DEAD, FROZEN, INNER, NONE, Blocks, IndexArray, Mesh
 from ..geometry import distance_squared, face_vector
+from .bisect import birth_between, bisect_edges
 
-__all__ = ["MAX_ROUNDS", "compact", "split_edges", "split_long_edges"]
+__all__ = ["MAX_ROUNDS", "ROOM", "compact", "split_edges", "split_long_edges"]
 
 # Every round halves the longest edge: 64 rounds divide any float64 length below any other.
 MAX_ROUNDS = 64
 
 _GONE = 255  # mask of a removed face
+
+# Where fewer edges than this share of the faces are long, they are split in place.
+_FEW = 1.0 / 16.0
+
+# Faces and vertices that a new mesh has room for, as a share of its faces: two for every split.
+ROOM = 2.0 * _FEW
 
 # Child triangles of a face by its mask of long edges (bit i: edge i from corner i to i + 1); with
 # two long edges bit 3 chooses the diagonal. Entries 0-2 are corners, 3-5 midpoints of edges 0-2.
@@ -101,18 +96,24 @@ def split_long_edges(
     Returns
     -------
     mesh : Mesh
-        The refined mesh in new arrays, or the same one where no edge is too long.
+        The refined mesh in new arrays; the same one where no edge is too long, or where a few were
+        split in place.
     n_split : int
         Edges split; call again until it is 0.
     """
     asked = np.empty(mesh.origin.size // 3, np.uint8)
-    count = np.zeros(len(blocks.face) - 1, np.int64)
+    count = np.zeros((len(blocks.face) - 1, 2), np.int64)
     _ask_for_splits(parallel, mesh, blocks, 0.5 * factor, asked, count)
-    if not count.any():
+    n_asked, n_dead = count.sum(axis=0).tolist()
+    if not n_asked:
         return mesh, 0
     if siblings is not None:
         _ask_siblings(asked, *siblings)
-    return _refine(mesh, blocks, asked, parallel)
+    elif 2 * n_asked <= n_dead and n_asked <= _FEW * len(asked):
+        n_split = bisect_edges(mesh, blocks, factor, asked, parallel)
+        if n_split:
+            return mesh, n_split
+    return _refine(mesh, blocks, asked, parallel, ROOM)
 
 
 def split_edges(mesh: Mesh, blocks: Blocks, edges: IndexArray, parallel: bool) -> Mesh:
@@ -132,22 +133,32 @@ def _ask_siblings(asked: np.ndarray, members: IndexArray, group: IndexArray) -> 
         np.bitwise_or.at(asked, members[wanted] // 3, bit[wanted])
 
 
-def compact(mesh: Mesh, blocks: Blocks, parallel: bool) -> Mesh:
-    """Drop removed faces and vertices, keeping the order: a split of no edge."""
+def compact(mesh: Mesh, blocks: Blocks, parallel: bool, room: float = 0.0) -> Mesh:
+    """Drop removed faces and vertices, keeping the order: a split of no edge.
+
+    ``room`` is left free for splits in place, as a share of the faces.
+    """
     asked = np.zeros(mesh.origin.size // 3, np.uint8)
     asked[mesh.origin[::3] == DEAD] = _GONE
-    return _refine(mesh, blocks, asked, parallel)[0]
+    return _refine(mesh, blocks, asked, parallel, room)[0]
 
 
-def _refine(mesh: Mesh, blocks: Blocks, asked: np.ndarray, parallel: bool) -> tuple[Mesh, int]:
-    """Write the mesh anew with the edges split that any face asks for; returns their number too."""
+def _refine(
+    mesh: Mesh, blocks: Blocks, asked: np.ndarray, parallel: bool, room: float = 0.0
+) -> tuple[Mesh, int]:
+    """Write the mesh anew with the edges split that any face asks for; returns their number too.
+
+    ``room`` is left free at the end of every block, as a share of its faces.
+    """
     mask = np.empty_like(asked)
     sizes = np.zeros((len(blocks.face) - 1, 3), np.int64)
     _mark_edges(parallel, mesh, blocks, asked, mask, sizes)
-    starts = np.zeros_like(sizes)
-    np.cumsum(sizes[:-1], axis=0, out=starts[1:])
-    n_faces, n_owned, n_split = sizes.sum(axis=0).tolist()
-    n_vertices = n_owned + n_split
+    ends = np.zeros((len(sizes) + 1, 2), np.int64)
+    free = (room * sizes[:, 0]).astype(np.int64)
+    np.cumsum(sizes[:, 0] + free, out=ends[1:, 0])
+    np.cumsum(sizes[:, 1] + sizes[:, 2] + free // 2, out=ends[1:, 1])
+    n_faces, n_vertices = ends[-1].tolist()
+    n_split = int(sizes[:, 2].sum())
     first_child = np.empty(mask.size, np.int32)
     new_vertex = np.empty(mesh.vertex_halfedge.size, np.int32)
     middle = np.empty(mesh.origin.size, np.int32)
@@ -162,10 +173,10 @@ def _refine(mesh: Mesh, blocks: Blocks, asked: np.ndarray, parallel: bool) -> tu
         np.empty(n_vertices, np.uint8),
         np.empty(n_vertices, np.int32),
     )
-    _number(parallel, mesh, blocks, mask, starts, first_child, new_vertex, middle)
+    _number(parallel, mesh, blocks, mask, ends, first_child, new_vertex, middle)
     numbers = (mask, first_child, new_vertex, middle)
-    _write_faces(parallel, mesh, blocks, *numbers, *refined[:4])
-    _write_vertices(parallel, mesh, blocks, *numbers, *refined[4:])
+    _write_faces(parallel, mesh, blocks, ends, *numbers, *refined[:4])
+    _write_vertices(parallel, mesh, blocks, ends, *numbers, *refined[4:])
     if n_split:
         _update_valences(mesh, mask, new_vertex, middle, refined)
     return refined, n_split
@@ -176,14 +187,23 @@ def _ask_for_splits(mesh, blocks, half_factor, asked, count):
     """Mask of the edges that each face wants split: the too long ones that are not frozen.
 
     A face lower than half the limit wants only its longest edge split: all three at once, a needle of
-    length l would fall into (l / L)^2 faces instead of 2 l / L.
+    length l would fall into (l / L)^2 faces instead of 2 l / L. Counts a block: edges asked for (twice
+    where both faces do), removed faces.
     """
     for k in prange(blocks.face.size - 1):
+        n_asked = 0
+        n_dead = 0
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            asked[f] = _GONE
-            if mesh.origin[3 * f] != DEAD:
-                asked[f] = _long_edges(mesh, f, half_factor)
-                count[k] += asked[f] != 0
+            if mesh.origin[3 * f] == DEAD:
+                asked[f] = _GONE
+                n_dead += 1
+                continue
+            mask = _long_edges(mesh, f, half_factor)
+            asked[f] = mask
+            if mask:
+                n_asked += (mask & 1) + ((mask >> 1) & 1) + (mask >> 2)
+        count[k, 0] = n_asked
+        count[k, 1] = n_dead
 
 
 @inlined
@@ -268,11 +288,11 @@ def _choose_diagonal(mesh, f, m):
 
 
 @driver
-def _number(mesh, blocks, mask, starts, first_child, new_vertex, middle):
+def _number(mesh, blocks, mask, ends, first_child, new_vertex, middle):
     """Give children, vertices and midpoints the order of the half-edges that own them."""
     for k in prange(blocks.face.size - 1):
-        child = starts[k, 0]
-        vertex = starts[k, 1] + starts[k, 2]
+        child = ends[k, 0]
+        vertex = ends[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
             if m == _GONE:
@@ -292,15 +312,19 @@ def _number(mesh, blocks, mask, starts, first_child, new_vertex, middle):
 
 
 @driver
-def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, origin, twin, curve, source):
+def _write_faces(
+    mesh, blocks, ends, mask, first_child, new_vertex, middle, origin, twin, curve, source
+):
     """Write children and their twins: inside a template from its table, across by parts of edges."""
     for k in prange(blocks.face.size - 1):
         ids = np.empty(6, np.int64)
+        end = ends[k, 0]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
             if m == _GONE:
                 continue
             base = 3 * np.int64(first_child[f])
+            end = first_child[f] + _COUNT[m]
             for i in range(3):
                 h = 3 * f + i
                 ids[i] = new_vertex[mesh.origin[h]]
@@ -328,6 +352,7 @@ def _write_faces(mesh, blocks, mask, first_child, new_vertex, middle, origin, tw
                 if half:
                     twin[base + _PART[m, 2 * i + 1]] = _part_of(t, 0, mask, first_child)
                     curve[base + _PART[m, 2 * i + 1]] = mesh.curve[3 * f + i]
+        origin[3 * end : 3 * ends[k + 1, 0]] = DEAD
 
 
 @inlined
@@ -343,10 +368,11 @@ def _part_of(h, half, mask, first_child):
 
 @driver
 def _write_vertices(
-    mesh, blocks, mask, first_child, new_vertex, middle, halfedge, excess, X, kind, birth
+    mesh, blocks, ends, mask, first_child, new_vertex, middle, halfedge, excess, X, kind, birth
 ):
     """Copy the vertices and put midpoints between them, each from the half-edge that owns it."""
     for k in prange(blocks.face.size - 1):
+        end = ends[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
             if m == _GONE:
@@ -357,6 +383,7 @@ def _write_vertices(
                 v = mesh.origin[h]
                 if mesh.vertex_halfedge[v] == h:
                     new = new_vertex[v]
+                    end = new + 1
                     halfedge[new] = base + _PART[m, 2 * i]
                     excess[new] = mesh.valence_excess[v]
                     kind[new] = mesh.kind[v]
@@ -365,34 +392,21 @@ def _write_vertices(
                         X[new, j] = mesh.X[v, j]
                 if (m >> i) & 1 and mesh.twin[h] < h:
                     new = middle[h]
+                    end = new + 1
                     w = mesh.origin[3 * f + (i + 1) % 3]
                     inner = mesh.twin[h] != NONE
                     halfedge[new] = base + _PART[m, 2 * i + 1]
                     # No face yet: `_update_valences` adds them. A boundary has an edge more.
                     excess[new] = -6 if inner else -3
                     kind[new] = INNER if mesh.curve[h] == NONE else CURVE
-                    birth[new] = _birth_between(mesh, h, v, w)
+                    birth[new] = birth_between(mesh, h, v, w)
                     for j in range(4):
                         X[new, j] = 0.5 * (mesh.X[v, j] + mesh.X[w, j])
-
-
-@inlined
-def _birth_between(mesh, h, v, w):
-    """Where on the reference a midpoint is looked for: on the curve of its edge, or in its patch.
-
-    Both half-edges of an edge, and all siblings of a seam, give the same answer.
-    """
-    c = mesh.curve[h]
-    if c == NONE:
-        # The birth of a vertex on a curve may be a face on the other side.
-        if mesh.kind[v] <= HELD:
-            return mesh.birth[v]
-        return mesh.birth[w] if mesh.kind[w] <= HELD else np.int32(3 * mesh.source[h // 3])
-    slides_v = CURVE <= mesh.kind[v] < FIXED
-    slides_w = CURVE <= mesh.kind[w] < FIXED
-    if slides_v:
-        return min(mesh.birth[v], mesh.birth[w]) if slides_w else mesh.birth[v]
-    return mesh.birth[w] if slides_w else np.int32(c & (SEAM - 1))
+        for v in range(end, ends[k + 1, 1]):
+            halfedge[v] = DEAD
+            kind[v] = INNER
+            birth[v] = 0
+            X[v] = 1.0
 
 
 @kernel
