@@ -265,9 +265,8 @@ class Sweeps:
             cos(radians(options.flip_normal)), options.delaunay_ties, options.sliver_check
         )
         with self.watch.time("flip"):
-            for _ in range(options.flip_passes):
-                tally = flip_edges(mesh, blocks, flips, parallel)
-                self.counts[-1]["flip"] = self.counts[-1].get("flip", 0) + int(tally[0])
+            tally = flip_edges(mesh, blocks, flips, parallel, options.flip_passes)
+            self.counts[-1]["flip"] = int(tally[0])
         self._is_cancelled(sweep, "flip")
         return mesh, blocks
 

@@ -38,37 +38,90 @@ class FlipLimits(NamedTuple):
     sliver_check: bool  # the worse of the two triangles must not get worse
 
 
-def flip_edges(mesh: Mesh, blocks: Blocks, limits: FlipLimits, parallel: bool) -> np.ndarray:
-    """Flip every edge whose flip is worth it, once; returns counts by outcome."""
+def flip_edges(
+    mesh: Mesh, blocks: Blocks, limits: FlipLimits, parallel: bool, passes: int = 1
+) -> np.ndarray:
+    """Flip every edge whose flip is worth it, once a pass; returns counts by outcome.
+
+    Later passes look at what the one before has touched: all else stays as it was, and for the same
+    reasons.
+    """
     candidates = np.empty(mesh.origin.size, np.int32)
-    count = np.zeros(len(blocks.face) - 1, np.int64)
-    _find_flips(parallel, mesh, blocks, limits.delaunay_ties, candidates, count)
-    tally = np.zeros((len(count), N_OUTCOMES), np.int64)
-    if count.any():
+    touched = np.zeros(mesh.vertex_halfedge.size, np.uint8)
+    total = np.zeros(N_OUTCOMES, np.int64)
+    for n in range(passes):
+        count = np.zeros(len(blocks.face) - 1, np.int64)
+        if n == 0:
+            _find_flips(parallel, mesh, blocks, limits.delaunay_ties, candidates, count)
+        else:
+            _find_again(parallel, mesh, blocks, limits.delaunay_ties, touched, candidates, count)
+        if not count.any():
+            break
+        tally = np.zeros((len(count), N_OUTCOMES), np.int64)
         for stage in stages(blocks):
             tally[:, OUTSIDE] = 0
-            _flip(parallel, mesh, blocks, stage, limits, candidates, count, tally)
-    return tally.sum(axis=0)
+            _flip(parallel, mesh, blocks, stage, limits, candidates, count, touched, tally)
+        total += tally.sum(axis=0)
+    return total
 
 
 @driver
 def _find_flips(mesh, blocks, delaunay_ties, candidates, count):
     for k in prange(blocks.face.size - 1):
         end = 3 * blocks.face[k]
-        for h in range(3 * blocks.face[k], 3 * blocks.face[k + 1]):
-            t = np.int64(mesh.twin[h])
-            if t > h or t == NONE or mesh.origin[h] == DEAD:
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            a = mesh.origin[3 * f]
+            if a == DEAD:
                 continue
-            gain = valence_gain(mesh, h, t)
-            wanted = gain > 0 or (gain == 0 and delaunay_ties and violates_delaunay(mesh, h, t))
-            if wanted and mesh.curve[h] == NONE:
-                candidates[end] = h
-                end += 1
+            # A flip takes from both ends and gives to both apexes. It gains nothing unless two of the
+            # four want that, so one of these three does: in half of all faces none.
+            ea = mesh.valence_excess[a]
+            eb = mesh.valence_excess[mesh.origin[3 * f + 1]]
+            ec = mesh.valence_excess[mesh.origin[3 * f + 2]]
+            if ea == 0 and eb == 0 and ec == 0:
+                continue
+            for i in range(3):
+                h = 3 * f + i
+                t = np.int64(mesh.twin[h])
+                if t < h and t != NONE and (ea > 0) + (eb > 0) + (ec < 0) > 0:
+                    candidates[end] = h
+                    end += _is_wanted(mesh, h, t, delaunay_ties)
+                ea, eb, ec = eb, ec, ea
         count[k] = end - 3 * blocks.face[k]
 
 
 @driver
-def _flip(mesh, blocks, stage, limits, candidates, count, tally):
+def _find_again(mesh, blocks, delaunay_ties, touched, candidates, count):
+    """List what is worth a flip around touched vertices: each edge by one of its two faces."""
+    for k in prange(blocks.face.size - 1):
+        end = 3 * blocks.face[k]
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            if mesh.origin[3 * f] == DEAD or not _is_touched(mesh, f, touched):
+                continue
+            for h in range(3 * f, 3 * f + 3):
+                t = np.int64(mesh.twin[h])
+                if t != NONE and (t < h or not _is_touched(mesh, t // 3, touched)):
+                    candidates[end] = h
+                    end += _is_wanted(mesh, h, t, delaunay_ties)
+        count[k] = end - 3 * blocks.face[k]
+
+
+@inlined
+def _is_touched(mesh, f, touched):
+    origin = mesh.origin
+    return touched[origin[3 * f]] | touched[origin[3 * f + 1]] | touched[origin[3 * f + 2]]
+
+
+@inlined
+def _is_wanted(mesh, h, t, delaunay_ties):
+    """Tell whether a flip gains valence, or keeps it and restores Delaunay."""
+    gain = valence_gain(mesh, h, t)
+    wanted = gain > 0 or (gain == 0 and delaunay_ties and violates_delaunay(mesh, h, t))
+    return wanted and mesh.curve[h] == NONE
+
+
+@driver
+def _flip(mesh, blocks, stage, limits, candidates, count, touched, tally):
     for k in prange(stage_blocks(blocks, stage)):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
@@ -80,14 +133,14 @@ def _flip(mesh, blocks, stage, limits, candidates, count, tally):
                 v = mesh.origin[h]
                 if v < low or v >= high:
                     continue
-                outcome = _flip_edge(mesh, h, low, high, limits)
+                outcome = _flip_edge(mesh, h, low, high, limits, touched)
                 tally[k, outcome] += 1
                 if outcome != OUTSIDE:
                     candidates[i] = DONE
 
 
 @inlined
-def _flip_edge(mesh, h, low, high, limits):
+def _flip_edge(mesh, h, low, high, limits, touched):
     """Flip one edge if it is still worth it and every guard agrees; returns the outcome."""
     b = mesh.origin[following(h)]
     c = mesh.origin[previous(h)]
@@ -99,8 +152,7 @@ def _flip_edge(mesh, h, low, high, limits):
     d = mesh.origin[previous(t)]
     if d < low or d >= high:
         return OUTSIDE
-    gain = valence_gain(mesh, h, t)
-    if gain < 0 or (gain == 0 and not (limits.delaunay_ties and violates_delaunay(mesh, h, t))):
+    if not _is_wanted(mesh, h, t, limits.delaunay_ties):
         return GONE
     if duplicates_edge(mesh, c, d):
         return KEPT_DUPLICATE
@@ -108,6 +160,10 @@ def _flip_edge(mesh, h, low, high, limits):
         return KEPT_NORMAL
     if limits.sliver_check and makes_sliver(mesh, h, t):
         return KEPT_SLIVER
+    touched[mesh.origin[h]] = 1
+    touched[b] = 1
+    touched[c] = 1
+    touched[d] = 1
     _turn_edge(mesh, h, t)
     return FLIPPED
 
@@ -129,11 +185,29 @@ def valence_gain(mesh, h, t):
 @inlined
 def violates_delaunay(mesh, h, t):
     """Tell whether the angles opposite the edge sum to more than pi (cotangents below 0)."""
-    return _cotangent(mesh, h) + _cotangent(mesh, t) < -1e-9
+    dot_c = _dot_opposite(mesh, h)
+    dot_d = _dot_opposite(mesh, t)
+    if dot_c >= 0.0 and dot_d >= 0.0:  # both acute, as almost always
+        return False
+    return _cotangent(mesh, h, dot_c) + _cotangent(mesh, t, dot_d) < -1e-9
 
 
 @inlined
-def _cotangent(mesh, h):
+def _dot_opposite(mesh, h):
+    """Scalar product of the two edges that meet opposite a half-edge."""
+    X = mesh.X
+    a = mesh.origin[h]
+    b = mesh.origin[following(h)]
+    c = mesh.origin[previous(h)]
+    return (
+        (X[a, 0] - X[c, 0]) * (X[b, 0] - X[c, 0])
+        + (X[a, 1] - X[c, 1]) * (X[b, 1] - X[c, 1])
+        + (X[a, 2] - X[c, 2]) * (X[b, 2] - X[c, 2])
+    )
+
+
+@inlined
+def _cotangent(mesh, h, dot):
     """Cotangent of the angle opposite a half-edge; far below zero for a face without area."""
     X = mesh.X
     a = mesh.origin[h]
@@ -141,11 +215,6 @@ def _cotangent(mesh, h):
     c = mesh.origin[previous(h)]
     nx, ny, nz = face_vector(
         X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
-    dot = (
-        (X[a, 0] - X[c, 0]) * (X[b, 0] - X[c, 0])
-        + (X[a, 1] - X[c, 1]) * (X[b, 1] - X[c, 1])
-        + (X[a, 2] - X[c, 2]) * (X[b, 2] - X[c, 2])
     )
     norm = sqrt(nx * nx + ny * ny + nz * nz)
     if norm == 0.0:
