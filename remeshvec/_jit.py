@@ -25,11 +25,60 @@ from types import CodeType, FunctionType
 from typing import Any
 
 import numba
-from numba.core import event
+from numba.core import event, ir, types
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.typed_passes import NopythonTypeInference
 
 __all__ = ["available_threads", "compile_notice", "driver", "inlined", "kernel", "thread_scope"]
 
-_FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _UnsignedIndices(FunctionPass):
+    """Type all indices into arrays as unsigned, once all types are known.
+
+    For a signed index Numba emits code that counts a negative one from the end, at every access: a
+    quarter of all instructions of our kernels. No kernel counts from the end.
+    """
+
+    _name = "remeshvec_unsigned_indices"
+
+    def __init__(self) -> None:
+        FunctionPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        """Change the signatures of getitem and setitem; lowering casts the indices to them."""
+        for block in state.func_ir.blocks.values():
+            for access in (*block.find_exprs("getitem"), *block.find_insts(ir.SetItem)):
+                call = state.calltypes[access]
+                if call is not None and isinstance(call.args[0], types.Array):
+                    args = (call.args[0], _unsigned(call.args[1]), *call.args[2:])
+                    state.calltypes.pop(access)  # a key is set once
+                    state.calltypes[access] = call.replace(args=args)
+        return True
+
+
+def _unsigned(index: Any) -> Any:
+    """Type of an index without negative values: an integer, or a tuple of some."""
+    if isinstance(index, types.Integer):
+        return types.uintp
+    if isinstance(index, types.BaseTuple):
+        return types.Tuple([_unsigned(part) for part in index])
+    return index
+
+
+class _Compiler(CompilerBase):
+    """Numba's compiler with `_UnsignedIndices`."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Put the pass behind type inference."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(_UnsignedIndices, NopythonTypeInference)
+        passes.finalize()
+        return [passes]
+
+
+_FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "pipeline_class": _Compiler}
 
 # Without `_nrt` a helper counts no references. Passing records of arrays to helpers that do costs
 # about a quarter of the time of a call, in atomic instructions that two threads fight for; in return such

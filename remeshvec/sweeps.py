@@ -26,13 +26,14 @@ from .lengths import bound_gradation
 from .operations.collapse import CollapseLimits, collapse_short_edges
 from .operations.fit import fit_vertices
 from .operations.flip import FlipLimits, flip_edges
+from .operations.measure import EdgeFlags, measure_edges
 from .operations.project import locate_vertices, project_vertices, read_lengths
 from .operations.relax import relax_vertices
 from .operations.siblings import collapse_siblings
 from .operations.slide import slide_vertices
 from .operations.split import MAX_ROUNDS, ROOM, compact, split_edges, split_long_edges
 from .operations.unfold import undo_folds
-from .operations.untangle import untangle_vertices
+from .operations.untangle import approach_vertices, untangle_vertices
 from .options import Options
 from .reference import Built
 from .report import Stopwatch
@@ -126,14 +127,17 @@ class Sweeps:
         for sweep in range(self.options.iterations):
             factor = self._split_factor(mesh, sweep)
             self.counts.append({})
-            mesh, blocks = self._split(mesh, blocks, built, factor)
+            flags: EdgeFlags | None
+            mesh, blocks, flags = self._split(mesh, blocks, built, sweep, factor)
             if self._is_cancelled(sweep, "split"):
                 break
             if self.guard is not None:
                 mesh = compact(mesh, blocks, self.is_parallel(mesh.origin.size // 3))
-                blocks = make_blocks(mesh)
+                blocks, flags = make_blocks(mesh), None
             mesh, blocks, step = self._guarded(
-                mesh, blocks, partial(self._change, built=built, sweep=sweep, varies=varies)
+                mesh,
+                blocks,
+                partial(self._change, built=built, sweep=sweep, varies=varies, flags=flags),
             )
             if self.stop == "cancelled" or self._has_converged(mesh, step):
                 break
@@ -199,10 +203,16 @@ class Sweeps:
         return _Changed(mesh, blocks, np.inf)
 
     def _change(
-        self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, varies: bool
+        self,
+        mesh: Mesh,
+        blocks: Blocks,
+        built: Built,
+        sweep: int,
+        varies: bool,
+        flags: EdgeFlags | None,
     ) -> _Changed:
         """Run the phases that change the mesh in place."""
-        mesh, blocks = self._connect(mesh, blocks, built, sweep)
+        mesh, blocks = self._connect(mesh, blocks, built, sweep, flags)
         if self.stop == "cancelled":
             return _Changed(mesh, blocks, np.inf)
         before = mesh.X[:, :3].copy() if self.options.tol is not None else None
@@ -216,25 +226,27 @@ class Sweeps:
         return _Changed(mesh, blocks, step)
 
     def _split(
-        self, mesh: Mesh, blocks: Blocks, built: Built, factor: float
-    ) -> tuple[Mesh, Blocks]:
-        """Split by rounds until no edge is too long."""
+        self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, factor: float
+    ) -> tuple[Mesh, Blocks, EdgeFlags]:
+        """Split by rounds until no edge is too long; returns what the last one measured too."""
         count = 0
         with self.watch.time("split"):
             for _ in range(MAX_ROUNDS):
                 parallel = self.is_parallel(mesh.origin.size // 3)
+                flags = measure_edges(mesh, blocks, factor, self.options.collapse[sweep], parallel)
                 siblings = None if built.on_seam is None else find_seams(mesh)
-                refined, n_split = split_long_edges(mesh, blocks, factor, parallel, siblings)
-                if not n_split:
-                    break
-                if refined is not mesh:
-                    mesh, blocks = refined, make_blocks(refined)
+                refined, n_split = split_long_edges(
+                    mesh, blocks, factor, parallel, siblings, flags
+                )
                 count += n_split
+                if refined is mesh:
+                    break
+                mesh, blocks = refined, make_blocks(refined)
         self.counts[-1]["split"] = count
-        return mesh, blocks
+        return mesh, blocks, flags
 
     def _connect(
-        self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int
+        self, mesh: Mesh, blocks: Blocks, built: Built, sweep: int, flags: EdgeFlags | None
     ) -> tuple[Mesh, Blocks]:
         """Collapse and flip."""
         options = self.options
@@ -247,7 +259,7 @@ class Sweeps:
             options.sliver_check,
         )
         with self.watch.time("collapse"):
-            tally = collapse_short_edges(mesh, blocks, limits, parallel)
+            tally = collapse_short_edges(mesh, blocks, limits, parallel, flags)
             self.counts[-1]["collapse"] = int(tally[0])
             if built.on_seam is not None:
                 self.counts[-1]["collapse"] += collapse_siblings(mesh, *find_seams(mesh), limits)
@@ -328,11 +340,12 @@ class Sweeps:
         options, tree = self.options, built.reference.tree
         if options.project:
             before = mesh.X.copy()
-            project_vertices(mesh, blocks, built.reference, 0.0, parallel)
+            project_vertices(mesh, blocks, built.reference, _TRUST, parallel)
             undo_folds(mesh, blocks, before, parallel)
         cosine = cos(radians(options.untangle_angle))
-        for _ in range(options.untangle_rounds):
-            untangle_vertices(mesh, blocks, tree, options.project, cosine, parallel)
+        untangle_vertices(
+            mesh, blocks, tree, options.project, cosine, options.untangle_rounds, parallel
+        )
         for _ in range(options.fit_rounds):
             fit_vertices(mesh, blocks, tree, _FIT_REACH, parallel)
         return _Changed(mesh, blocks, 0.0)
@@ -346,14 +359,14 @@ class Sweeps:
         parallel = self.is_parallel(len(mesh.origin) // 3)
         blocks, tree = make_blocks(mesh), built.reference.tree
         for _ in range(_EVENING_ROUNDS):
-            if not untangle_vertices(
+            if not approach_vertices(
                 mesh,
                 blocks,
                 tree,
                 self.options.project,
                 1.0 / 3.0,
-                parallel,
                 _CENTROID_SHARE * tolerance,
+                parallel,
             ):
                 break
         for _ in range(_REFINEMENTS):

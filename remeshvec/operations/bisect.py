@@ -13,69 +13,59 @@ from numba import prange
 from .._jit import driver, inlined
 from .._types import CURVE, DEAD, FIXED, HELD, INNER, NONE, SEAM, Blocks, Mesh
 from ..edge_sets import OWNED, REST, SHIFTED, list_range, stage_blocks, stages, vertex_range
-from ..geometry import distance_squared
 from ..halfedge import following, previous
+from .measure import GONE, EdgeFlags, edge_flags
 
 __all__ = ["bisect_edges", "birth_between"]
 
-_GONE = 255  # of a removed face, see `split`
 
+def bisect_edges(mesh: Mesh, blocks: Blocks, flags: EdgeFlags, parallel: bool) -> tuple[int, int]:
+    """Split all long edges until there are none, or no room; returns how many were, and are left.
 
-def bisect_edges(
-    mesh: Mesh, blocks: Blocks, factor: float, asked: np.ndarray, parallel: bool
-) -> int:
-    """Split the edges asked for, where there is room; returns how many were.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    blocks : Blocks
-    factor : float
-        Only edges longer than this times their target length: earlier splits may have halved one.
-    asked : (m,) uint8
-        Mask of edges a face (bit i: that from corner i), 255 for removed faces. Bits that are dealt with
-        are cleared.
-    parallel : bool
+    ``flags.mask`` is kept up to date: it says of the mesh afterwards what it said of that before.
     """
-    done = np.zeros(len(blocks.face) - 1, np.int64)
-    for stage in stages(blocks):
-        left = np.zeros(len(done), np.int64)
-        _bisect(parallel, mesh, blocks, stage, 0.5 * factor, asked, done, left)
-        if not left.any():
-            break
-    return int(done.sum())
+    n_split = 0
+    while True:
+        done = np.zeros(len(blocks.face) - 1, np.int64)
+        for stage in stages(blocks):
+            left = np.zeros(len(done), np.int64)
+            _bisect(
+                parallel, mesh, blocks, stage, 0.5 * flags.longest, 2.0 * flags.shortest,
+                flags.mask, done, left,
+            )  # fmt: skip
+            if not left.any():
+                break
+        n_split += int(done.sum())
+        n_left = int(left.sum())
+        if not n_left or not done.any():
+            return n_split, n_left
 
 
 @driver
-def _bisect(mesh, blocks, stage, half_factor, asked, done, left):
+def _bisect(mesh, blocks, stage, half_longest, twice_shortest, mask, done, left):
     for k in prange(stage_blocks(blocks, stage)):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
         room, room_end = _face_range(blocks, stage, k)
         v = low
         for f in range(blocks.face[first], blocks.face[end]):
-            if asked[f] == 0 or asked[f] == _GONE:
+            if mask[f] & 7 == 0 or mask[f] == GONE:
                 continue
             for i in range(3):
-                if not (asked[f] >> i) & 1:
+                if not (mask[f] >> i) & 1:
                     continue
                 h = 3 * f + i
+                is_inner = mesh.twin[h] != NONE
                 if not _is_owned(mesh, h, low, high):
                     left[k] += 1
                     continue
-                if not _is_long(mesh, h, half_factor):
-                    asked[f] &= ~(1 << i)
-                    continue
                 v = _next_dead(mesh.vertex_halfedge, 1, v, high)
                 room = _next_dead(mesh.origin, 3, room, room_end)
-                other = room_end
-                if mesh.twin[h] != NONE:
-                    other = _next_dead(mesh.origin, 3, room + 1, room_end)
-                if v == high or room == room_end or (mesh.twin[h] != NONE and other == room_end):
-                    left[k] += 1
-                    continue
-                _split_edge(mesh, h, v, room, other, asked)
-                done[k] += 1
+                other = _next_dead(mesh.origin, 3, room + 1, room_end) if is_inner else room
+                left[k] += 1  # what was too long may have long halves
+                if v < high and max(room, other) < room_end:
+                    _split_edge(mesh, h, v, room, other, half_longest, twice_shortest, mask)
+                    done[k] += 1
 
 
 @inlined
@@ -114,19 +104,9 @@ def _is_owned(mesh, h, low, high):
 
 
 @inlined
-def _is_long(mesh, h, half_factor):
-    a = mesh.origin[h]
-    b = mesh.origin[following(h)]
-    limit = half_factor * (mesh.X[a, 3] + mesh.X[b, 3])
-    return distance_squared(mesh.X, a, b) > limit * limit
-
-
-@inlined
-def _split_edge(mesh, h, v, f, g, asked):
+def _split_edge(mesh, h, v, f, g, half_longest, twice_shortest, mask):
     """Put vertex ``v`` in the middle of an edge, with new faces ``f`` and, across it, ``g``."""
-    t = np.int64(mesh.twin[h])
-    is_inner = t != NONE
-    h = max(h, t)  # births of midpoints, as in `split`, are those that the later half-edge gives
+    h = max(h, np.int64(mesh.twin[h]))  # as in `split`, the later half-edge gives the birth
     t = np.int64(mesh.twin[h])
     a = np.int64(mesh.origin[h])
     b = np.int64(mesh.origin[following(h)])
@@ -134,20 +114,23 @@ def _split_edge(mesh, h, v, f, g, asked):
     mesh.kind[v] = INNER if mesh.curve[h] == NONE else CURVE
     for i in range(4):
         mesh.X[v, i] = 0.5 * (mesh.X[a, i] + mesh.X[b, i])
-    mesh.valence_excess[v] = -2 if is_inner else -1
+    mesh.valence_excess[v] = -1 if t == NONE else -2
     mesh.vertex_halfedge[v] = 3 * f
-    _halve_face(mesh, h, v, f, asked)
+    _halve_face(mesh, h, v, f)
     mesh.twin[3 * f] = t
-    if is_inner:
-        _halve_face(mesh, t, v, g, asked)
-        mesh.twin[3 * f] = t
+    if t != NONE:
+        _halve_face(mesh, t, v, g)
         mesh.twin[t] = 3 * f
         mesh.twin[3 * g] = h
         mesh.twin[h] = 3 * g
+        mask[t // 3] = edge_flags(mesh, t // 3, half_longest, twice_shortest)
+        mask[g] = edge_flags(mesh, g, half_longest, twice_shortest)
+    mask[h // 3] = edge_flags(mesh, h // 3, half_longest, twice_shortest)
+    mask[f] = edge_flags(mesh, f, half_longest, twice_shortest)
 
 
 @inlined
-def _halve_face(mesh, h, v, f, asked):
+def _halve_face(mesh, h, v, f):
     """Face a b c of ``h`` becomes a v c, and face ``f`` v b c; twins across the edge are left open."""
     n = following(h)
     b = np.int64(mesh.origin[n])
@@ -168,9 +151,6 @@ def _halve_face(mesh, h, v, f, asked):
     mesh.valence_excess[c] += 1
     if mesh.vertex_halfedge[b] == n:
         mesh.vertex_halfedge[b] = 3 * f + 1
-    # What was asked for the edge that moved to the new face is left to the next round.
-    i = h % 3
-    asked[h // 3] &= ~((1 << i) | (1 << ((i + 1) % 3)))
 
 
 @inlined

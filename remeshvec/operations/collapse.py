@@ -19,6 +19,7 @@ from .._types import CURVE, DEAD, FROZEN, INNER, NONE, SEAM, Blocks, FloatArray,
 from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
 from ..geometry import SHARP, distance_squared
 from ..halfedge import following, previous
+from .measure import GONE, EdgeFlags, is_short, measure_edges
 from .guards import folds_over, keeps_curves, keeps_link, makes_sliver, overshoots
 
 __all__ = [
@@ -85,12 +86,21 @@ class CollapseLimits(NamedTuple):
 
 
 def collapse_short_edges(
-    mesh: Mesh, blocks: Blocks, limits: CollapseLimits, parallel: bool
+    mesh: Mesh,
+    blocks: Blocks,
+    limits: CollapseLimits,
+    parallel: bool,
+    flags: EdgeFlags | None = None,
 ) -> np.ndarray:
-    """Collapse the short edges but for those with siblings; returns counts by outcome."""
+    """Collapse the short edges but for those with siblings; returns counts by outcome.
+
+    ``flags`` are what `measure_edges` says of this mesh and these limits, where that is known.
+    """
+    if flags is None:
+        flags = measure_edges(mesh, blocks, np.inf, limits.shortest, parallel)
     candidates = np.empty(mesh.origin.size, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _find_short_edges(parallel, mesh, blocks, limits.shortest, candidates, count)
+    _list_short_edges(parallel, mesh, blocks, flags.mask, candidates, count)
     tally = np.zeros((len(count), N_OUTCOMES), np.int64)
     if count.any():
         for stage in stages(blocks):
@@ -100,40 +110,18 @@ def collapse_short_edges(
 
 
 @driver
-def _find_short_edges(mesh, blocks, factor, candidates, count):
+def _list_short_edges(mesh, blocks, mask, candidates, count):
     for k in prange(blocks.face.size - 1):
         end = 3 * blocks.face[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            a = mesh.origin[3 * f]
-            if a == DEAD:
+            short = mask[f] >> 3
+            if short == 0 or mask[f] == GONE:
                 continue
-            b = mesh.origin[3 * f + 1]
-            c = mesh.origin[3 * f + 2]
-            l0 = distance_squared(mesh.X, a, b)
-            l1 = distance_squared(mesh.X, b, c)
-            l2 = distance_squared(mesh.X, c, a)
-            sa, sb, sc = mesh.X[a, 3], mesh.X[b, 3], mesh.X[c, 3]
-            # Stores without branches: whether an edge is short cannot be predicted.
-            h = 3 * f
-            candidates[end] = h
-            end += is_short(l0, sa, sb, factor) & (mesh.twin[h] < h)
-            candidates[min(end, h + 1)] = h + 1
-            end += is_short(l1, sb, sc, factor) & (mesh.twin[h + 1] < h + 1)
-            candidates[min(end, h + 2)] = h + 2
-            end += is_short(l2, sc, sa, factor) & (mesh.twin[h + 2] < h + 2)
+            for i in range(3):
+                h = 3 * f + i
+                candidates[end] = h
+                end += ((short >> i) & 1) & (mesh.twin[h] < h)
         count[k] = end - 3 * blocks.face[k]
-
-
-@inlined
-def is_short(length_squared, s, t, factor):
-    """Tell whether an edge is shorter than a factor of the harmonic mean of its ends' target lengths.
-
-    Splits take the arithmetic mean: where lengths jump, beside an edge that must not be split, there
-    is room between the two.
-    """
-    total = s + t
-    product = 2.0 * factor * s * t
-    return length_squared * total * total < product * product
 
 
 @driver

@@ -13,16 +13,15 @@ import numpy as np
 from numba import prange
 
 from .._jit import driver, inlined, kernel
-from .._types import CURVE, DEAD, FROZEN, INNER, NONE, Blocks, IndexArray, Mesh
-from ..geometry import distance_squared, face_vector
+from .._types import CURVE, DEAD, INNER, NONE, Blocks, IndexArray, Mesh
+from ..geometry import distance_squared
 from .bisect import birth_between, bisect_edges
+from .measure import GONE, EdgeFlags, measure_edges
 
 __all__ = ["MAX_ROUNDS", "ROOM", "compact", "split_edges", "split_long_edges"]
 
 # Every round halves the longest edge: 64 rounds divide any float64 length below any other.
 MAX_ROUNDS = 64
-
-_GONE = 255  # mask of a removed face
 
 # Where fewer edges than this share of the faces are long, they are split in place.
 _FEW = 1.0 / 16.0
@@ -88,38 +87,39 @@ def split_long_edges(
     factor: float,
     parallel: bool,
     siblings: tuple[IndexArray, IndexArray] | None = None,
+    flags: EdgeFlags | None = None,
 ) -> tuple[Mesh, int]:
-    """Split every edge longer than ``factor`` times its target length, once.
+    """Split every edge longer than ``factor`` times its target length.
 
-    Siblings (see `polyline.find_siblings`) are split together.
+    Once, by writing the mesh anew; or, where they are few and there is room, in place until none is left.
+    Siblings (see `polyline.find_siblings`) are split together. ``flags`` are what `measure_edges` says of
+    this mesh and factor, where that is known; of a mesh that is split in place they stay true.
 
     Returns
     -------
     mesh : Mesh
-        The refined mesh in new arrays; the same one where no edge is too long, or where a few were
-        split in place.
+        The refined mesh in new arrays; the same one where no edge is too long any more.
     n_split : int
-        Edges split; call again until it is 0.
+        Edges split.
     """
-    asked = np.empty(mesh.origin.size // 3, np.uint8)
-    count = np.zeros((len(blocks.face) - 1, 2), np.int64)
-    _ask_for_splits(parallel, mesh, blocks, 0.5 * factor, asked, count)
-    n_asked, n_dead = count.sum(axis=0).tolist()
-    if not n_asked:
-        return mesh, 0
+    if flags is None:
+        flags = measure_edges(mesh, blocks, factor, 0.0, parallel)
+    n_split = 0
+    n_left = flags.n_long
     if siblings is not None:
-        _ask_siblings(asked, *siblings)
-    elif 2 * n_asked <= n_dead and n_asked <= _FEW * len(asked):
-        n_split = bisect_edges(mesh, blocks, factor, asked, parallel)
-        if n_split:
-            return mesh, n_split
-    return _refine(mesh, blocks, asked, parallel, ROOM)
+        _ask_siblings(flags.mask, *siblings)
+    elif 2 * n_left <= flags.n_gone and n_left <= _FEW * len(flags.mask):
+        n_split, n_left = bisect_edges(mesh, blocks, flags, parallel)
+    if not n_left:
+        return mesh, n_split
+    mesh, more = _refine(mesh, blocks, flags.mask, parallel, ROOM)
+    return mesh, n_split + more
 
 
 def split_edges(mesh: Mesh, blocks: Blocks, edges: IndexArray, parallel: bool) -> Mesh:
     """Split the given half-edges, whatever their length."""
     asked = np.zeros(mesh.origin.size // 3, np.uint8)
-    asked[mesh.origin[::3] == DEAD] = _GONE
+    asked[mesh.origin[::3] == DEAD] = GONE
     np.bitwise_or.at(asked, edges // 3, (1 << (edges % 3)).astype(np.uint8))
     return _refine(mesh, blocks, asked, parallel)[0]
 
@@ -139,7 +139,7 @@ def compact(mesh: Mesh, blocks: Blocks, parallel: bool, room: float = 0.0) -> Me
     ``room`` is left free for splits in place, as a share of the faces.
     """
     asked = np.zeros(mesh.origin.size // 3, np.uint8)
-    asked[mesh.origin[::3] == DEAD] = _GONE
+    asked[mesh.origin[::3] == DEAD] = GONE
     return _refine(mesh, blocks, asked, parallel, room)[0]
 
 
@@ -183,61 +183,6 @@ def _refine(
 
 
 @driver
-def _ask_for_splits(mesh, blocks, half_factor, asked, count):
-    """Mask of the edges that each face wants split: the too long ones that are not frozen.
-
-    A face lower than half the limit wants only its longest edge split: all three at once, a needle of
-    length l would fall into (l / L)^2 faces instead of 2 l / L. Counts a block: edges asked for (twice
-    where both faces do), removed faces.
-    """
-    for k in prange(blocks.face.size - 1):
-        n_asked = 0
-        n_dead = 0
-        for f in range(blocks.face[k], blocks.face[k + 1]):
-            if mesh.origin[3 * f] == DEAD:
-                asked[f] = _GONE
-                n_dead += 1
-                continue
-            mask = _long_edges(mesh, f, half_factor)
-            asked[f] = mask
-            if mask:
-                n_asked += (mask & 1) + ((mask >> 1) & 1) + (mask >> 2)
-        count[k, 0] = n_asked
-        count[k, 1] = n_dead
-
-
-@inlined
-def _long_edges(mesh, f, half_factor):
-    X = mesh.X
-    a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
-    l0 = distance_squared(X, a, b)
-    l1 = distance_squared(X, b, c)
-    l2 = distance_squared(X, c, a)
-    m0 = half_factor * (X[a, 3] + X[b, 3])
-    m1 = half_factor * (X[b, 3] + X[c, 3])
-    m2 = half_factor * (X[c, 3] + X[a, 3])
-    mask = (l0 > m0 * m0) + 2 * (l1 > m1 * m1) + 4 * (l2 > m2 * m2)
-    if mask == 0:
-        return mask
-    for i in range(3):
-        if mesh.curve[3 * f + i] <= FROZEN:
-            mask &= ~(1 << i)
-    if mask == 0 or mask == 1 or mask == 2 or mask == 4:
-        return mask
-    nx, ny, nz = face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
-    l0 *= mask & 1
-    l1 *= (mask >> 1) & 1
-    l2 *= (mask >> 2) & 1
-    longest = max(l0, l1, l2)
-    limit = (m0 + m1 + m2) / 3.0
-    if nx * nx + ny * ny + nz * nz >= 0.25 * limit * limit * longest:
-        return mask
-    return 1 if l0 == longest else (2 if l1 == longest else 4)
-
-
-@driver
 def _mark_edges(mesh, blocks, asked, mask, sizes):
     """Mask of the edges to split a face, those that either face asks for, and the diagonal.
 
@@ -249,9 +194,10 @@ def _mark_edges(mesh, blocks, asked, mask, sizes):
         split = 0
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(asked[f])
-            if m == _GONE:
-                mask[f] = _GONE
+            if m == GONE:
+                mask[f] = GONE
                 continue
+            m &= 7
             for i in range(3):
                 h = 3 * f + i
                 t = np.int64(mesh.twin[h])
@@ -295,7 +241,7 @@ def _number(mesh, blocks, mask, ends, first_child, new_vertex, middle):
         vertex = ends[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
-            if m == _GONE:
+            if m == GONE:
                 continue
             first_child[f] = child
             child += _COUNT[m]
@@ -321,7 +267,7 @@ def _write_faces(
         end = ends[k, 0]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
-            if m == _GONE:
+            if m == GONE:
                 continue
             base = 3 * np.int64(first_child[f])
             end = first_child[f] + _COUNT[m]
@@ -375,7 +321,7 @@ def _write_vertices(
         end = ends[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
-            if m == _GONE:
+            if m == GONE:
                 continue
             base = 3 * np.int64(first_child[f])
             for i in range(3):
@@ -417,7 +363,7 @@ def _update_valences(mesh, mask, new_vertex, middle, refined):
     """
     for f in range(mask.size):
         m = np.int64(mask[f])
-        if m == 0 or m == _GONE:
+        if m == 0 or m == GONE:
             continue
         for i in range(3):
             h = 3 * f + i

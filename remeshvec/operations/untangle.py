@@ -13,15 +13,16 @@ from math import sqrt
 
 import numpy as np
 from numba import prange
+from numpy.typing import NDArray
 
 from .._jit import driver, inlined
-from .._types import DEAD, INNER, NONE, Blocks, Mesh, Tree
+from .._types import DEAD, INNER, NONE, Blocks, IndexArray, Mesh, Tree
 from ..bvh import point_on_face, walk_to_face
 from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
-from ..geometry import face_vector, tangent_basis, turn_exceeds
+from ..geometry import distance_squared, face_vector, tangent_basis, turn_exceeds
 from ..halfedge import following, previous
 
-__all__ = ["untangle_vertices"]
+__all__ = ["approach_vertices", "untangle_vertices"]
 
 # Hubs with more spokes are left alone.
 _CAPACITY = 64
@@ -37,47 +38,121 @@ _DIRECTIONS = np.stack(
 
 
 def untangle_vertices(
+    mesh: Mesh, blocks: Blocks, tree: Tree, on_surface: bool, limit: float, rounds: int, parallel: bool
+) -> int:
+    """Improve rings with an angle below ``acos(limit)``; returns how many vertices moved.
+
+    With ``on_surface`` every trial position is the closest point that a walk on the reference surface
+    finds, so that no projection spoils afterwards what was gained. Rounds after the first look at rings
+    that the one before has changed.
+    """
+    n = mesh.vertex_halfedge.size
+    candidates = np.empty(n, np.int32)
+    moved = np.ones(n, np.uint8)
+    total = 0
+    for _ in range(rounds):
+        bad, near = np.zeros(n, np.uint8), np.zeros(n, np.uint8)
+        _mark_bad_faces(parallel, mesh, blocks, limit, moved, bad, near)
+        count = np.zeros(len(blocks.face) - 1, np.int64)
+        _list_marked(parallel, mesh, blocks, bad, near, candidates, count)
+        moved[:] = 0
+        _search_rings(
+            mesh, blocks, tree, on_surface, limit, 0.0, candidates, count, moved, parallel
+        )
+        n_moved = np.count_nonzero(moved)
+        if not n_moved:
+            break
+        total += n_moved
+    return total
+
+
+def approach_vertices(
     mesh: Mesh,
     blocks: Blocks,
     tree: Tree,
     on_surface: bool,
     limit: float,
+    distance: float,
     parallel: bool,
-    distance: float = 0.0,
 ) -> int:
-    """Improve rings with an angle below ``acos(limit)``; returns how many vertices moved.
+    """Improve rings with a face whose centroid is farther than a distance from the reference surface.
 
-    With a ``distance`` instead those with a face whose centroid is farther than that from the reference
-    surface, where ``limit`` is a squared circumradius in squared target lengths that costs as much as
-    the distance. With ``on_surface`` every trial position is the closest point that a walk on the
-    reference surface finds, so that no projection spoils afterwards what was gained.
+    ``limit`` is a squared circumradius in squared target lengths that costs as much as the distance.
+    Returns how many vertices moved.
     """
-    if distance > 0.0:
-        distance = limit / distance**2  # both costs against one limit
-    candidates = np.empty(mesh.vertex_halfedge.size, np.int32)
+    n = mesh.vertex_halfedge.size
+    candidates = np.empty(n, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _find_bad_rings(parallel, mesh, blocks, tree, limit, distance, candidates, count)
-    moved = np.zeros(len(count), np.int64)
+    weight = limit / distance**2  # both costs against one limit
+    _find_far_rings(parallel, mesh, blocks, tree, limit, weight, candidates, count)
+    moved = np.zeros(n, np.uint8)
+    _search_rings(mesh, blocks, tree, on_surface, limit, weight, candidates, count, moved, parallel)
+    return int(np.count_nonzero(moved))
+
+
+def _search_rings(
+    mesh: Mesh,
+    blocks: Blocks,
+    tree: Tree,
+    on_surface: bool,
+    limit: float,
+    weight: float,
+    candidates: IndexArray,
+    count: NDArray[np.int64],
+    moved: NDArray[np.uint8],
+    parallel: bool,
+) -> None:
     if count.any():
         for stage in stages(blocks):
             _untangle(
-                parallel,
-                mesh,
-                blocks,
-                stage,
-                tree,
-                on_surface,
-                limit,
-                distance,
-                candidates,
-                count,
-                moved,
-            )
-    return int(moved.sum())
+                parallel, mesh, blocks, stage, tree, on_surface, limit, weight, candidates, count, moved
+            )  # fmt: skip
 
 
 @driver
-def _find_bad_rings(mesh, blocks, tree, limit, distance, candidates, count):
+def _mark_bad_faces(mesh, blocks, limit, moved, bad, near):
+    """Mark the corners of faces with a small angle, and those of faces with a moved corner.
+
+    Blocks may mark the same vertex, with the same value.
+    """
+    X = mesh.X
+    for k in prange(blocks.face.size - 1):
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            a = mesh.origin[3 * f]
+            if a == DEAD:
+                continue
+            b = mesh.origin[3 * f + 1]
+            c = mesh.origin[3 * f + 2]
+            if not moved[a] | moved[b] | moved[c]:
+                continue
+            near[a] = 1
+            near[b] = 1
+            near[c] = 1
+            l0 = distance_squared(X, a, b)
+            l1 = distance_squared(X, b, c)
+            l2 = distance_squared(X, c, a)
+            # The smallest angle lies opposite the shortest side, between the two others.
+            shortest = min(l0, l1, l2)
+            product = l0 * l1 * l2 / shortest
+            dot = 0.5 * (l0 + l1 + l2) - shortest
+            if not dot * dot <= limit * limit * product:
+                bad[a] = 1
+                bad[b] = 1
+                bad[c] = 1
+
+
+@driver
+def _list_marked(mesh, blocks, bad, near, candidates, count):
+    for k in prange(blocks.vertex.size - 1):
+        end = blocks.vertex[k]
+        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
+            candidates[end] = v
+            end += (bad[v] & near[v]) == 1 and mesh.kind[v] == INNER
+        count[k] = end - blocks.vertex[k]
+
+
+@driver
+def _find_far_rings(mesh, blocks, tree, limit, weight, candidates, count):
     for k in prange(blocks.vertex.size - 1):
         ring = np.empty((_CAPACITY, 3))
         end = blocks.vertex[k]
@@ -91,14 +166,14 @@ def _find_bad_rings(mesh, blocks, tree, limit, distance, candidates, count):
                 x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
                 face = np.int64(mesh.birth[v]) // 3
                 # Only a distance makes a ring bad, not a circle alone: the surface may be flat there.
-                if _cost(ring, n, x, y, z, x, y, z, distance, 0.0, tree, face) > limit:
+                if _cost(ring, n, x, y, z, x, y, z, weight, 0.0, tree, face) > limit:
                     candidates[end] = v
                     end += 1
         count[k] = end - blocks.vertex[k]
 
 
 @driver
-def _untangle(mesh, blocks, stage, tree, on_surface, limit, distance, candidates, count, moved):
+def _untangle(mesh, blocks, stage, tree, on_surface, limit, weight, candidates, count, moved):
     for k in prange(stage_blocks(blocks, stage)):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
@@ -113,8 +188,8 @@ def _untangle(mesh, blocks, stage, tree, on_surface, limit, distance, candidates
                 )
                 if n > 0:
                     candidates[i] = DONE
-                    moved[k] += _search(
-                        mesh.X, mesh.birth, v, ring, n, tree, on_surface, limit, distance
+                    moved[v] = _search(
+                        mesh.X, mesh.birth, v, ring, n, tree, on_surface, limit, weight
                     )
 
 
