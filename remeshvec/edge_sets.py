@@ -108,8 +108,9 @@ def vertex_range(blocks, stage, k):
 @inlined
 def list_range(blocks, stage, k):
     """Candidate lists (first, end) that block ``k`` of a stage reads."""
+    k = np.int64(k)
     if stage == OWNED:
         return k, k + 1
     if stage == SHIFTED:
         return k, k + 2
-    return np.int64(0), blocks.face.size - 1
+    return np.int64(0), np.int64(blocks.face.size - 1)

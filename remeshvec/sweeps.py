@@ -267,8 +267,9 @@ class Sweeps:
             return mesh, blocks
         n_faces = mesh.origin.size // 3
         with self.watch.time("collapse"):
-            # Only where this sweep made holes: to count them is a pass over all faces.
-            if 8 * self.counts[-1]["collapse"] > n_faces:
+            # Only where this sweep made holes: to count them is a pass over all faces. What the guard
+            # has seen must keep its numbers.
+            if 8 * self.counts[-1]["collapse"] > n_faces and self.guard is None:
                 if np.count_nonzero(mesh.origin[::3] == DEAD) > _SPARSE * n_faces:
                     mesh = compact(mesh, blocks, parallel, ROOM)
                     blocks = make_blocks(mesh)

@@ -24,6 +24,7 @@ LEVELS = {
         "operations", "operations.split", "operations.collapse", "operations.flip",
         "operations.relax", "operations.project", "operations.slide", "operations.unfold",
         "operations.untangle", "operations.fit", "operations.guards", "operations.siblings",
+        "operations.bisect", "operations.measure",
     ],
     5: [
         "options", "constraints", "prepare", "lengths", "reference", "seams", "deviation",
@@ -38,6 +39,8 @@ SIDEWAYS = {
     ("bvh", "halfedge"), ("curves", "halfedge"), ("orient", "halfedge"), ("polyline", "halfedge"),
     ("creases", "_chains"), ("creases", "_echo"), ("sizing", "curvature"), ("sizing", "gradation"),
     ("operations.collapse", "operations.guards"), ("operations.siblings", "operations.collapse"),
+    ("operations.bisect", "operations.measure"), ("operations.collapse", "operations.measure"),
+    ("operations.split", "operations.bisect"), ("operations.split", "operations.measure"),
     ("operations.slide", "operations.project"),
     ("lengths", "constraints"), ("lengths", "prepare"),
     ("reference", "constraints"), ("seams", "reference"), ("deviation", "reference"),

@@ -177,12 +177,17 @@ def examine_edge(mesh, h, low, high, limits, rings):
         return GONE, 0.0, 0.0, 0.0, 0.0, 0, 0
     if not keeps_curves(mesh, h, a, b):
         return KEPT_CURVE, 0.0, 0.0, 0.0, 0.0, 0, 0
-    # Three quarters of all candidates overshoot. Whether they do can be seen on the way around the ring,
-    # from the midpoint, before anything else is computed.
+    # Three quarters of all candidates overshoot. Whether they do can be seen from the midpoint before
+    # anything else is computed: straight ahead first, then on the way around the rings.
     kind = max(mesh.kind[a], mesh.kind[b])
     x, y, z, s = _meeting_point(mesh, a, b, False, False)
     half = 0.5 * limits.longest
     slack = _CURVE_SLACK if min(mesh.kind[a], mesh.kind[b]) == CURVE else 1.0
+    if slack == 1.0 and (
+        _overshoots_ahead(mesh, h, x, y, z, s, low, high, half)
+        or _overshoots_ahead(mesh, np.int64(mesh.twin[h]), x, y, z, s, low, high, half)
+    ):
+        return KEPT_OVERSHOOT, 0.0, 0.0, 0.0, 0.0, 0, 0
     n_a, m_a = _survey_ring(mesh, a, b, x, y, z, s, low, high, half, slack, rings, 0)
     if n_a <= 0:
         return -n_a, 0.0, 0.0, 0.0, 0.0, 0, 0
@@ -210,6 +215,24 @@ def examine_edge(mesh, h, low, high, limits, rings):
     elif limits.sliver_check and makes_sliver(mesh, x, y, z, a, b, rings.face, n_a, n_b):
         outcome = KEPT_SLIVER
     return outcome, x, y, z, s, n_a, n_b
+
+
+@inlined
+def _overshoots_ahead(mesh, h, x, y, z, s, low, high, half_factor):
+    """Guard of `_survey_ring` for one ring vertex: the third from the end of ``h``, opposite in most rings."""
+    for _ in range(3):
+        if h == NONE:
+            return False
+        h = np.int64(mesh.twin[previous(h)])
+    if h == NONE:
+        return False
+    w = mesh.origin[following(h)]
+    if w < low or w >= high:
+        return False
+    X = mesh.X
+    dx, dy, dz = X[w, 0] - x, X[w, 1] - y, X[w, 2] - z
+    limit = half_factor * (s + X[w, 3])
+    return dx * dx + dy * dy + dz * dz > limit * limit
 
 
 @inlined

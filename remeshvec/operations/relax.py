@@ -15,15 +15,16 @@ from math import sqrt
 import numpy as np
 from numba import prange
 
-from .._jit import driver, inlined, kernel
+from .._jit import add_four, add_row, driver, inlined, kernel
 from .._types import CURVE, DEAD, INNER, NONE, Blocks, Mesh
 from ..geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
 
 __all__ = ["relax_vertices"]
 
-# Columns of the sums: weights, weighted positions, normal, its weight, normal tensor (xx xy xz yy yz
-# zz), its weight; padded to two cache lines.
-N_SUMS = 16
+# Columns of the sums: weighted positions and weights, normal and its length without cancellation, normal
+# tensor (xx xy xz yy, yz; zz follows from its trace). Rows begin where cache lines do.
+_PLAIN_SUMS = 8
+_STIFF_SUMS = 16
 
 
 def relax_vertices(mesh: Mesh, blocks: Blocks, stiffness: float, parallel: bool) -> None:
@@ -31,29 +32,27 @@ def relax_vertices(mesh: Mesh, blocks: Blocks, stiffness: float, parallel: bool)
 
     ``stiffness`` is the hold of curved ridges on their vertices; 0 for none.
     """
-    points = np.empty((mesh.vertex_halfedge.size, 4))  # where vertices were, and their weights
-    sums = np.empty((mesh.vertex_halfedge.size, N_SUMS))
+    weighted = np.empty((mesh.vertex_halfedge.size, 4))  # positions times weights, and weights
+    n_sums = _STIFF_SUMS if stiffness > 0.0 else _PLAIN_SUMS
+    sums = np.empty((mesh.vertex_halfedge.size, n_sums))
     across = np.empty(mesh.origin.size // 3, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    _sum_areas(parallel, mesh, blocks, points, across, count)
-    _sum_areas_across(mesh, blocks, points, across, count)
-    _sum_rings(parallel, mesh, blocks, stiffness, points, sums)
-    _sum_rings_across(mesh, blocks, stiffness, points, across, count, sums)
-    _move(parallel, mesh, blocks, stiffness, points, sums, mesh.X)
+    _sum_areas(parallel, mesh, blocks, weighted, across, count)
+    _sum_areas_across(mesh, blocks, weighted, across, count)
+    _weight(parallel, mesh, blocks, weighted)
+    _sum_rings(parallel, mesh, blocks, stiffness, weighted, sums)
+    _sum_rings_across(mesh, blocks, stiffness, weighted, across, count, sums)
+    _move(parallel, mesh, blocks, stiffness, sums, mesh.X)
 
 
 @driver
-def _sum_areas(mesh, blocks, points, across, count):
+def _sum_areas(mesh, blocks, weighted, across, count):
     """Mixed Voronoi areas from the faces inside a block; lists the faces across borders."""
-    X = mesh.X
     for k in prange(blocks.face.size - 1):
         low = blocks.vertex[k]
         high = blocks.vertex[k + 1]
         for v in range(low, high):
-            points[v, 0] = X[v, 0]
-            points[v, 1] = X[v, 1]
-            points[v, 2] = X[v, 2]
-            points[v, 3] = 0.0
+            weighted[v, 3] = 0.0
         end = blocks.face[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             a = mesh.origin[3 * f]
@@ -65,20 +64,23 @@ def _sum_areas(mesh, blocks, points, across, count):
                 across[end] = f
                 end += 1
                 continue
-            _add_areas(points, a, b, c)
+            _add_areas(mesh.X, a, b, c, weighted)
         count[k] = end - blocks.face[k]
 
 
 @kernel
-def _sum_areas_across(mesh, blocks, points, across, count):
+def _sum_areas_across(mesh, blocks, weighted, across, count):
     for k in range(blocks.face.size - 1):
         for i in range(blocks.face[k], blocks.face[k] + count[k]):
             f = across[i]
-            _add_areas(points, mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2])
+            a = mesh.origin[3 * f]
+            b = mesh.origin[3 * f + 1]
+            c = mesh.origin[3 * f + 2]
+            _add_areas(mesh.X, a, b, c, weighted)
 
 
 @inlined
-def _add_areas(X, a, b, c):
+def _add_areas(X, a, b, c, weighted):
     ux, uy, uz = X[c, 0] - X[b, 0], X[c, 1] - X[b, 1], X[c, 2] - X[b, 2]
     vx, vy, vz = X[a, 0] - X[c, 0], X[a, 1] - X[c, 1], X[a, 2] - X[c, 2]
     wx, wy, wz = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
@@ -89,123 +91,109 @@ def _add_areas(X, a, b, c):
         wx * wx + wy * wy + wz * wz,
         sqrt(nx * nx + ny * ny + nz * nz),
     )
-    X[a, 3] += area_a
-    X[b, 3] += area_b
-    X[c, 3] += area_c
+    weighted[a, 3] += area_a
+    weighted[b, 3] += area_b
+    weighted[c, 3] += area_c
 
 
 @driver
-def _sum_rings(mesh, blocks, stiffness, points, sums):
+def _weight(mesh, blocks, weighted):
+    """Divide areas by the squared target length, and multiply positions by that."""
+    X = mesh.X
+    for k in prange(blocks.vertex.size - 1):
+        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
+            weight = weighted[v, 3] / (X[v, 3] * X[v, 3])
+            # Half of the cell of a boundary vertex is missing: counted so, it would let its neighbours
+            # drift inwards until the edges between are split, and collapsed, for ever.
+            if mesh.kind[v] >= CURVE and mesh.twin[max(0, mesh.vertex_halfedge[v])] == NONE:
+                weight *= 2.0
+            weighted[v, 0] = weight * X[v, 0]
+            weighted[v, 1] = weight * X[v, 1]
+            weighted[v, 2] = weight * X[v, 2]
+            weighted[v, 3] = weight
+
+
+@driver
+def _sum_rings(mesh, blocks, stiffness, weighted, sums):
     for k in prange(blocks.face.size - 1):
         low = blocks.vertex[k]
         high = blocks.vertex[k + 1]
         sums[low:high] = 0.0
-        for v in range(low, high):
-            points[v, 3] /= mesh.X[v, 3] * mesh.X[v, 3]
-            # Half of the cell of a boundary vertex is missing: counted so, it would let its neighbours
-            # drift inwards until the edges between are split, and collapsed, for ever.
-            if mesh.kind[v] >= CURVE and mesh.twin[max(0, mesh.vertex_halfedge[v])] == NONE:
-                points[v, 3] *= 2.0
         for f in range(blocks.face[k], blocks.face[k + 1]):
             a = mesh.origin[3 * f]
             b = mesh.origin[3 * f + 1]
             c = mesh.origin[3 * f + 2]
             if min(a, b, c) >= low and max(a, b, c) < high:
-                _add_face(points, a, b, c, stiffness, sums)
+                _add_face(mesh.X, weighted, a, b, c, stiffness, sums)
 
 
 @kernel
-def _sum_rings_across(mesh, blocks, stiffness, points, across, count, sums):
+def _sum_rings_across(mesh, blocks, stiffness, weighted, across, count, sums):
     for k in range(blocks.face.size - 1):
         for i in range(blocks.face[k], blocks.face[k] + count[k]):
             f = across[i]
             a = mesh.origin[3 * f]
             b = mesh.origin[3 * f + 1]
             c = mesh.origin[3 * f + 2]
-            _add_face(points, a, b, c, stiffness, sums)
+            _add_face(mesh.X, weighted, a, b, c, stiffness, sums)
 
 
 @inlined
-def _add_face(X, a, b, c, stiffness, sums):
+def _add_face(X, weighted, a, b, c, stiffness, sums):
     """Add a face to the sums of its corners; its half-edges bring each the neighbour they end at."""
     nx, ny, nz = face_vector(
         X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
     )
-    _add_neighbour(X, a, b, sums)
-    _add_neighbour(X, b, c, sums)
-    _add_neighbour(X, c, a, sums)
+    add_row(sums, a, weighted, b)
+    add_row(sums, b, weighted, c)
+    add_row(sums, c, weighted, a)
     norm = sqrt(nx * nx + ny * ny + nz * nz)
-    if norm == 0.0:
-        return
-    ux, uy, uz = nx / norm, ny / norm, nz / norm
-    _add_normal(sums, a, norm, ux, uy, uz)
-    _add_normal(sums, b, norm, ux, uy, uz)
-    _add_normal(sums, c, norm, ux, uy, uz)
-    if stiffness > 0.0:
-        _add_tensor(sums, a, ux, uy, uz, nx, ny, nz, norm)
-        _add_tensor(sums, b, ux, uy, uz, nx, ny, nz, norm)
-        _add_tensor(sums, c, ux, uy, uz, nx, ny, nz, norm)
-
-
-@inlined
-def _add_neighbour(X, v, w, sums):
-    area = X[w, 3]
-    sums[v, 0] += area
-    sums[v, 1] += area * X[w, 0]
-    sums[v, 2] += area * X[w, 1]
-    sums[v, 3] += area * X[w, 2]
-
-
-@inlined
-def _add_normal(sums, v, weight, ux, uy, uz):
-    sums[v, 4] += weight * ux
-    sums[v, 5] += weight * uy
-    sums[v, 6] += weight * uz
-    sums[v, 7] += weight
-
-
-@inlined
-def _add_tensor(sums, v, ux, uy, uz, nx, ny, nz, norm):
-    sums[v, 8] += ux * nx
-    sums[v, 9] += ux * ny
-    sums[v, 10] += ux * nz
-    sums[v, 11] += uy * ny
-    sums[v, 12] += uy * nz
-    sums[v, 13] += uz * nz
-    sums[v, 14] += norm
+    add_four(sums, a, 4, nx, ny, nz, norm)
+    add_four(sums, b, 4, nx, ny, nz, norm)
+    add_four(sums, c, 4, nx, ny, nz, norm)
+    if stiffness > 0.0 and norm > 0.0:
+        scale = 1.0 / norm
+        ux, uy = nx * scale, ny * scale
+        xx, xy, xz, yy, yz = ux * nx, ux * ny, ux * nz, uy * ny, uy * nz
+        add_four(sums, a, 8, xx, xy, xz, yy)
+        add_four(sums, b, 8, xx, xy, xz, yy)
+        add_four(sums, c, 8, xx, xy, xz, yy)
+        sums[a, 12] += yz
+        sums[b, 12] += yz
+        sums[c, 12] += yz
 
 
 @driver
-def _move(mesh, blocks, stiffness, points, sums, X):
+def _move(mesh, blocks, stiffness, sums, X):
     for k in prange(blocks.vertex.size - 1):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
-            if mesh.vertex_halfedge[v] == DEAD:
-                continue
-            if mesh.kind[v] == INNER:
-                dx, dy, dz = _step(points, v, sums, stiffness)
-                X[v, 0] = points[v, 0] + dx
-                X[v, 1] = points[v, 1] + dy
-                X[v, 2] = points[v, 2] + dz
+            if mesh.vertex_halfedge[v] != DEAD and mesh.kind[v] == INNER:
+                dx, dy, dz = _step(X, v, sums, stiffness)
+                X[v, 0] += dx
+                X[v, 1] += dy
+                X[v, 2] += dz
 
 
 @inlined
-def _step(P, v, sums, stiffness):
+def _step(X, v, sums, stiffness):
     # A vertex on a sharp edge has no tangent plane: it stays, or the rim of a sheet would creep inwards.
     nx, ny, nz = sums[v, 4], sums[v, 5], sums[v, 6]
     norm = sqrt(nx * nx + ny * ny + nz * nz)
-    if not (sums[v, 0] > 0.0 and norm > SHARP * sums[v, 7]):
+    if not (sums[v, 3] > 0.0 and norm > SHARP * sums[v, 7]):
         return 0.0, 0.0, 0.0
-    nx /= norm
-    ny /= norm
-    nz /= norm
-    dx = sums[v, 1] / sums[v, 0] - P[v, 0]
-    dy = sums[v, 2] / sums[v, 0] - P[v, 1]
-    dz = sums[v, 3] / sums[v, 0] - P[v, 2]
+    scale = 1.0 / norm
+    nx *= scale
+    ny *= scale
+    nz *= scale
+    scale = 1.0 / sums[v, 3]
+    dx = sums[v, 0] * scale - X[v, 0]
+    dy = sums[v, 1] * scale - X[v, 1]
+    dz = sums[v, 2] * scale - X[v, 2]
     along = dx * nx + dy * ny + dz * nz
     dx -= along * nx
     dy -= along * ny
     dz -= along * nz
-    if stiffness > 0.0 and sums[v, 14] > 0.0:
+    if stiffness > 0.0:
         dx, dy, dz = _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness)
     return dx, dy, dz
 
@@ -216,9 +204,10 @@ def _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness):
 
     Across a curved ridge Q is large and the vertex stays on it; along the ridge it still slides.
     """
-    scale = 1.0 / sums[v, 14]
+    scale = 1.0 / sums[v, 7]
     xx, xy, xz = sums[v, 8] * scale, sums[v, 9] * scale, sums[v, 10] * scale
-    yy, yz, zz = sums[v, 11] * scale, sums[v, 12] * scale, sums[v, 13] * scale
+    yy, yz = sums[v, 11] * scale, sums[v, 12] * scale
+    zz = 1.0 - xx - yy
     # The share of the tensor outside the normal; below 1e-3 the ring is flat to 2 degrees.
     along = (
         nx * (xx * nx + 2.0 * (xy * ny + xz * nz)) + ny * (yy * ny + 2.0 * yz * nz) + nz * zz * nz
