@@ -140,19 +140,25 @@ def compact(mesh: Mesh, blocks: Blocks, parallel: bool, room: float = 0.0) -> Me
     """
     asked = np.zeros(mesh.origin.size // 3, np.uint8)
     asked[mesh.origin[::3] == DEAD] = GONE
-    return _refine(mesh, blocks, asked, parallel, room)[0]
+    return _refine(mesh, blocks, asked, parallel, room, False)[0]
 
 
 def _refine(
-    mesh: Mesh, blocks: Blocks, asked: np.ndarray, parallel: bool, room: float = 0.0
+    mesh: Mesh,
+    blocks: Blocks,
+    asked: np.ndarray,
+    parallel: bool,
+    room: float = 0.0,
+    splits: bool = True,
 ) -> tuple[Mesh, int]:
     """Write the mesh anew with the edges split that any face asks for; returns their number too.
 
-    ``room`` is left free at the end of every block, as a share of its faces.
+    ``room`` is left free at the end of every block, as a share of its faces. ``splits`` says whether
+    any edge is asked for.
     """
     mask = np.empty_like(asked)
     sizes = np.zeros((len(blocks.face) - 1, 3), np.int64)
-    _mark_edges(parallel, mesh, blocks, asked, mask, sizes)
+    _mark_edges(parallel, mesh, blocks, asked, splits, mask, sizes)
     ends = np.zeros((len(sizes) + 1, 2), np.int64)
     free = (room * sizes[:, 0]).astype(np.int64)
     np.cumsum(sizes[:, 0] + free, out=ends[1:, 0])
@@ -175,18 +181,18 @@ def _refine(
     )
     _number(parallel, mesh, blocks, mask, ends, first_child, new_vertex, middle)
     numbers = (mask, first_child, new_vertex, middle)
-    _write_faces(parallel, mesh, blocks, ends, *numbers, *refined[:4])
-    _write_vertices(parallel, mesh, blocks, ends, *numbers, *refined[4:])
+    _write(parallel, mesh, blocks, ends, *numbers, *refined)
     if n_split:
         _update_valences(mesh, mask, new_vertex, middle, refined)
     return refined, n_split
 
 
 @driver
-def _mark_edges(mesh, blocks, asked, mask, sizes):
-    """Mask of the edges to split a face, those that either face asks for, and the diagonal.
+def _mark_edges(mesh, blocks, asked, splits, mask, sizes):
+    """Template of every face: mask of the edges that it or a neighbour wants split, and the diagonal.
 
-    Sizes per block: children, vertices owned, edges split.
+    Bits 4 to 6 say which of the corners' vertices follow this face. Sizes per block: children, vertices
+    owned, edges split.
     """
     for k in prange(blocks.face.size - 1):
         children = 0
@@ -198,20 +204,23 @@ def _mark_edges(mesh, blocks, asked, mask, sizes):
                 mask[f] = GONE
                 continue
             m &= 7
+            if splits:
+                for i in range(3):
+                    h = 3 * f + i
+                    t = np.int64(mesh.twin[h])
+                    if t != NONE:
+                        g = t // 3
+                        m |= ((np.int64(asked[g]) >> (t - 3 * g)) & 1) << i
+                    split += ((m >> i) & 1) & (t < h)
+                if m == 3 or m == 5 or m == 6:
+                    m = _choose_diagonal(mesh, f, m)
+            children += _COUNT[m]
             for i in range(3):
                 h = 3 * f + i
-                t = np.int64(mesh.twin[h])
-                if t != NONE:
-                    g = t // 3
-                    m |= ((np.int64(asked[g]) >> (t - 3 * g)) & 1) << i
-                if mesh.vertex_halfedge[mesh.origin[h]] == h:
-                    owned += 1
-                if (m >> i) & 1 and t < h:
-                    split += 1
-            if m == 3 or m == 5 or m == 6:
-                m = _choose_diagonal(mesh, f, m)
+                is_owner = np.int64(mesh.vertex_halfedge[mesh.origin[h]] == h)
+                owned += is_owner
+                m |= is_owner << (4 + i)
             mask[f] = m
-            children += _COUNT[m]
         sizes[k, 0] = children
         sizes[k, 1] = owned
         sizes[k, 2] = split
@@ -244,12 +253,13 @@ def _number(mesh, blocks, mask, ends, first_child, new_vertex, middle):
             if m == GONE:
                 continue
             first_child[f] = child
-            child += _COUNT[m]
+            child += _COUNT[m & 15]
+            if m == 0:
+                continue
             for i in range(3):
                 h = 3 * f + i
-                v = mesh.origin[h]
-                if mesh.vertex_halfedge[v] == h:
-                    new_vertex[v] = vertex
+                if (m >> (4 + i)) & 1:
+                    new_vertex[mesh.origin[h]] = vertex
                     vertex += 1
                 # The later half-edge of a pair owns the midpoint; one without twin is the later.
                 if (m >> i) & 1 and mesh.twin[h] < h:
@@ -258,47 +268,87 @@ def _number(mesh, blocks, mask, ends, first_child, new_vertex, middle):
 
 
 @driver
-def _write_faces(
-    mesh, blocks, ends, mask, first_child, new_vertex, middle, origin, twin, curve, source
-):
-    """Write children and their twins: inside a template from its table, across by parts of edges."""
+def _write(
+    mesh, blocks, ends, mask, first_child, new_vertex, middle,
+    origin, twin, curve, source, halfedge, excess, X, kind, birth,
+):  # fmt: skip
+    """Write the children of every face and the vertices that follow it; what is left free is dead."""
     for k in prange(blocks.face.size - 1):
         ids = np.empty(6, np.int64)
-        end = ends[k, 0]
+        face = ends[k, 0]
+        vertex = ends[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
             if m == GONE:
                 continue
+            owned = m >> 4
+            m &= 15
             base = 3 * np.int64(first_child[f])
-            end = first_child[f] + _COUNT[m]
-            for i in range(3):
-                h = 3 * f + i
-                ids[i] = new_vertex[mesh.origin[h]]
-                if (m >> i) & 1:
-                    ids[3 + i] = middle[max(h, np.int64(mesh.twin[h]))]
+            face = first_child[f] + _COUNT[m]
             if m == 0:  # most faces: a copy
-                origin[base], origin[base + 1], origin[base + 2] = ids[0], ids[1], ids[2]
                 for i in range(3):
+                    origin[base + i] = new_vertex[mesh.origin[3 * f + i]]
                     twin[base + i] = _part_of(mesh.twin[3 * f + i], 0, mask, first_child)
                     curve[base + i] = mesh.curve[3 * f + i]
                 source[base // 3] = mesh.source[f]
+            else:
+                for i in range(3):
+                    h = 3 * f + i
+                    ids[i] = new_vertex[mesh.origin[h]]
+                    if (m >> i) & 1:
+                        ids[3 + i] = middle[max(h, np.int64(mesh.twin[h]))]
+                _write_children(mesh, f, m, base, ids, mask, first_child, origin, twin, curve, source)
+            if owned == 0 and m == 0:
                 continue
-            for j in range(_COUNT[m]):
-                source[base // 3 + j] = mesh.source[f]
-            for j in range(3 * _COUNT[m]):
-                curve[base + j] = NONE
-                origin[base + j] = ids[_CORNER[m, j]]
-                twin[base + j] = base + _INNER[m, j] if _INNER[m, j] >= 0 else NONE
             for i in range(3):
-                # Halves meet crosswise: the first of this side lies on the second of the other.
-                half = (m >> i) & 1
-                t = mesh.twin[3 * f + i]
-                twin[base + _PART[m, 2 * i]] = _part_of(t, half, mask, first_child)
-                curve[base + _PART[m, 2 * i]] = mesh.curve[3 * f + i]
-                if half:
-                    twin[base + _PART[m, 2 * i + 1]] = _part_of(t, 0, mask, first_child)
-                    curve[base + _PART[m, 2 * i + 1]] = mesh.curve[3 * f + i]
-        origin[3 * end : 3 * ends[k + 1, 0]] = DEAD
+                h = 3 * f + i
+                v = mesh.origin[h]
+                if (owned >> i) & 1:
+                    new = new_vertex[v]
+                    vertex = np.int64(new) + 1
+                    halfedge[new] = base + (i if m == 0 else _PART[m, 2 * i])
+                    excess[new] = mesh.valence_excess[v]
+                    kind[new] = mesh.kind[v]
+                    birth[new] = mesh.birth[v]
+                    for j in range(4):
+                        X[new, j] = mesh.X[v, j]
+                if (m >> i) & 1 and mesh.twin[h] < h:
+                    new = middle[h]
+                    vertex = np.int64(new) + 1
+                    w = mesh.origin[3 * f + (i + 1) % 3]
+                    halfedge[new] = base + _PART[m, 2 * i + 1]
+                    # No face yet: `_update_valences` adds them. A boundary has an edge more.
+                    excess[new] = -6 if mesh.twin[h] != NONE else -3
+                    kind[new] = INNER if mesh.curve[h] == NONE else CURVE
+                    birth[new] = birth_between(mesh, h, v, w)
+                    for j in range(4):
+                        X[new, j] = 0.5 * (mesh.X[v, j] + mesh.X[w, j])
+        origin[3 * face : 3 * ends[k + 1, 0]] = DEAD
+        for v in range(vertex, ends[k + 1, 1]):
+            halfedge[v] = DEAD
+            kind[v] = INNER
+            birth[v] = 0
+            X[v] = 1.0
+
+
+@inlined
+def _write_children(mesh, f, m, base, ids, mask, first_child, origin, twin, curve, source):
+    """Write children and their twins: inside a template from its table, across by parts of edges."""
+    for j in range(_COUNT[m]):
+        source[base // 3 + j] = mesh.source[f]
+    for j in range(3 * _COUNT[m]):
+        curve[base + j] = NONE
+        origin[base + j] = ids[_CORNER[m, j]]
+        twin[base + j] = base + _INNER[m, j] if _INNER[m, j] >= 0 else NONE
+    for i in range(3):
+        # Halves meet crosswise: the first of this side lies on the second of the other.
+        half = (m >> i) & 1
+        t = mesh.twin[3 * f + i]
+        twin[base + _PART[m, 2 * i]] = _part_of(t, half, mask, first_child)
+        curve[base + _PART[m, 2 * i]] = mesh.curve[3 * f + i]
+        if half:
+            twin[base + _PART[m, 2 * i + 1]] = _part_of(t, 0, mask, first_child)
+            curve[base + _PART[m, 2 * i + 1]] = mesh.curve[3 * f + i]
 
 
 @inlined
@@ -308,7 +358,7 @@ def _part_of(h, half, mask, first_child):
         return np.int64(NONE)
     f = np.int64(h) // 3
     i = np.int64(h) - 3 * f
-    m = np.int64(mask[f])
+    m = np.int64(mask[f]) & 15
     return 3 * np.int64(first_child[f]) + (i if m == 0 else _PART[m, 2 * i + half])
 
 
@@ -362,8 +412,8 @@ def _update_valences(mesh, mask, new_vertex, middle, refined):
     2 ns a face, and a pass over bytes where nothing was split.
     """
     for f in range(mask.size):
-        m = np.int64(mask[f])
-        if m == 0 or m == GONE:
+        m = np.int64(mask[f]) & 15
+        if m == 0 or mask[f] == GONE:
             continue
         for i in range(3):
             h = 3 * f + i
