@@ -15,12 +15,14 @@ No ``fastmath``: results decide topology and must not depend on how a loop was v
 from __future__ import annotations
 
 import hashlib
+import itertools
 import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
+from queue import SimpleQueue
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -32,7 +34,17 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.typed_passes import NopythonTypeInference
 from numba.extending import intrinsic
 
-__all__ = ["available_threads", "compile_notice", "driver", "inlined", "kernel", "thread_scope"]
+__all__ = [
+    "add_four",
+    "add_row",
+    "available_threads",
+    "compile_notice",
+    "driver",
+    "inlined",
+    "kernel",
+    "thread_scope",
+    "threaded",
+]
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
@@ -121,12 +133,10 @@ if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         builder.store(builder.fadd(builder.load(address, align=8), vector), address, align=8)
 
     @intrinsic
-    def add_row(typingctx, target, i, source, k):  # type: ignore[no-untyped-def]  # noqa: F811, D103
+    def add_row(typingctx, target, i, source, k):  # type: ignore[no-untyped-def]
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
             zero = context.get_constant(types.intp, 0)
-            i, k = (
-                context.cast(builder, args[n], signature.args[n], types.intp) for n in (1, 3)
-            )
+            i, k = (context.cast(builder, args[n], signature.args[n], types.intp) for n in (1, 3))
             row = builder.load(_address(context, builder, source, args[2], k, zero), align=8)
             _add(builder, _address(context, builder, target, args[0], i, zero), row)
             return context.get_dummy_value()
@@ -134,11 +144,9 @@ if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         return types.void(target, i, source, k), generate
 
     @intrinsic
-    def add_four(typingctx, target, i, j, x, y, z, w):  # type: ignore[no-untyped-def]  # noqa: F811, D103
+    def add_four(typingctx, target, i, j, x, y, z, w):  # type: ignore[no-untyped-def]
         def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-            i, j = (
-                context.cast(builder, args[n], signature.args[n], types.intp) for n in (1, 2)
-            )
+            i, j = (context.cast(builder, args[n], signature.args[n], types.intp) for n in (1, 2))
             vector = llvm.Constant(_FOUR, llvm.Undefined)
             for n in range(4):
                 lane = llvm.Constant(llvm.IntType(32), n)
@@ -165,6 +173,35 @@ class kernel:  # lower case: a decorator, used like a function
     def __call__(self, *args: Any) -> Any:
         """Run."""
         return self.serial(*args)
+
+
+class threaded:
+    """Compile a loop over pieces, which threads may share: ``f(parallel, ...)`` runs all of them.
+
+    The kernel takes the range of pieces to run as its first argument. ``count`` tells from the others
+    how many there are. Pieces never conflict, so which thread runs which of them changes no bit.
+    """
+
+    def __init__(self, count: Callable[..., int]) -> None:
+        self.count = count
+
+    def __call__(self, function: Callable[..., Any]) -> _Threaded:
+        """Decorate."""
+        return _Threaded(function, self.count)
+
+
+class _Threaded(kernel):
+    def __init__(self, function: Callable[..., Any], count: Callable[..., int]) -> None:
+        super().__init__(function)
+        self.count = count
+
+    def __call__(self, parallel: bool, *args: Any) -> None:
+        """Run on this thread, or on all threads of the current scope."""
+        count = self.count(*args)
+        if parallel and count > 1:
+            _share(self.serial, count, args)
+        else:
+            self.serial((0, count), *args)
 
 
 class driver(kernel):
@@ -226,10 +263,98 @@ def _feed(digest: Any, code: CodeType, scope: dict[str, Any], seen: set[CodeType
 
 # -- threads ----------------------------------------------------------------------------------
 
-# Numba's portable thread pool aborts the process when two Python threads enter it at once, and a
-# forked child has no pool. Whoever does not get the lock runs serially, with the same result.
-_pool_lock = threading.Lock()
-_pool_process = os.getpid()
+# Kernels release the GIL, so plain Python threads run them at once, on one build. Numba's own parallel
+# loops would need a second one (30 s of compilation), cannot be entered by two Python threads at once nor
+# after a fork, and wait for all their threads at the end of every loop, for milliseconds if another
+# process holds a core. Here whoever is awake takes the next piece.
+
+_PIECES = 4  # for each thread: where one is held up, the others take its pieces
+
+
+class _Helpers:
+    """Threads that wait for work, shared by all calls of this process."""
+
+    def __init__(self) -> None:
+        self.jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self.count = 0
+        self.lock = threading.Lock()
+
+    def ask(self, job: Callable[[], None], count: int) -> None:
+        """Let up to ``count`` threads do a job."""
+        with self.lock:
+            while self.count < count:
+                threading.Thread(target=self._work, daemon=True, name="remeshvec").start()
+                self.count += 1
+        for _ in range(count):
+            self.jobs.put(job)
+
+    def _work(self) -> None:
+        while True:
+            self.jobs.get()()
+
+
+class _Job:
+    """The pieces of one loop: whoever comes takes the next."""
+
+    def __init__(self, run: Callable[..., None], count: int, pieces: int, args: Any) -> None:
+        self.run, self.count, self.pieces, self.args = run, count, pieces, args
+        self.next = itertools.count().__next__  # atomic
+        self.finished: SimpleQueue[BaseException | None] = SimpleQueue()
+
+    def take(self) -> int:
+        """Run pieces until none is left; returns how many."""
+        taken = 0
+        while (i := self.next()) < self.pieces:
+            span = i * self.count // self.pieces, (i + 1) * self.count // self.pieces
+            self.run(span, *self.args)
+            taken += 1
+        return taken
+
+    def help(self) -> None:
+        """Run pieces on another thread."""
+        while (i := self.next()) < self.pieces:
+            error = None
+            try:
+                span = i * self.count // self.pieces, (i + 1) * self.count // self.pieces
+                self.run(span, *self.args)
+            except BaseException as raised:
+                error = raised
+            self.finished.put(error)
+
+
+def _share(run: Callable[..., None], count: int, args: Any) -> None:
+    """Run all pieces of a loop on the threads of the current scope."""
+    job = _Job(run, count, min(count, _PIECES * _scope.threads), args)
+    _helpers.ask(job.help, min(_scope.threads, job.pieces) - 1)
+    taken = job.take()
+    for _ in range(job.pieces - taken):
+        error = job.finished.get()
+        if error is not None:
+            raise error
+
+
+class _Scope(threading.local):
+    """Threads that the call on this Python thread may use, itself among them."""
+
+    threads = 1
+
+
+_helpers = _Helpers()
+_scope = _Scope()
+_calls = 0  # that are running in this process, and may use threads
+_calls_lock = threading.Lock()
+
+
+def _after_fork() -> None:
+    """Start anew: a forked child has no threads but its own."""
+    global _helpers, _calls, _calls_lock
+    _helpers = _Helpers()
+    _calls = 0
+    _calls_lock = threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
 
 
 def available_threads() -> int:
@@ -239,19 +364,22 @@ def available_threads() -> int:
 
 @contextmanager
 def thread_scope(threads: int) -> Iterator[bool]:
-    """Reserve the thread pool for one call; yields whether parallel drivers may run."""
-    wanted = min(threads, available_threads())
-    may_run = wanted > 1 and os.getpid() == _pool_process and _pool_lock.acquire(blocking=False)
-    if not may_run:
-        yield False
-        return
-    before = numba.get_num_threads()
+    """Reserve threads for one call; yields whether there is more than one.
+
+    Calls that run at the same time share what is available.
+    """
+    global _calls
+    with _calls_lock:
+        _calls += 1
+        share = available_threads() // _calls
+    before = _scope.threads
+    _scope.threads = max(1, min(threads, share))
     try:
-        numba.set_num_threads(wanted)
-        yield True
+        yield _scope.threads > 1
     finally:
-        numba.set_num_threads(before)
-        _pool_lock.release()
+        _scope.threads = before
+        with _calls_lock:
+            _calls -= 1
 
 
 # -- the line that explains a slow first call -------------------------------------------------

@@ -18,6 +18,8 @@ A candidate list is one array with a slot range a face block; a stage sets what 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ._jit import inlined
@@ -30,7 +32,8 @@ __all__ = [
     "SHIFTED",
     "list_range",
     "make_blocks",
-    "stage_blocks",
+    "per_block",
+    "per_stage_block",
     "stages",
     "vertex_range",
 ]
@@ -83,10 +86,14 @@ def stages(blocks: Blocks) -> tuple[int, ...]:
     return (OWNED, SHIFTED, REST) if len(blocks.face) > 2 else (OWNED,)
 
 
-@inlined
-def stage_blocks(blocks, stage):
-    """Count the blocks that a stage runs in parallel."""
-    count = blocks.face.size - 1
+def per_block(mesh: Mesh, blocks: Blocks, *_: Any) -> int:
+    """Pieces of a loop over blocks."""
+    return len(blocks.face) - 1
+
+
+def per_stage_block(mesh: Mesh, blocks: Blocks, stage: int, *_: Any) -> int:
+    """Pieces of a loop over the blocks of a stage."""
+    count = len(blocks.face) - 1
     if stage == OWNED:
         return count
     return count - 1 if stage == SHIFTED else 1

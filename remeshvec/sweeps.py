@@ -235,9 +235,7 @@ class Sweeps:
                 parallel = self.is_parallel(mesh.origin.size // 3)
                 flags = measure_edges(mesh, blocks, factor, self.options.collapse[sweep], parallel)
                 siblings = None if built.on_seam is None else find_seams(mesh)
-                refined, n_split = split_long_edges(
-                    mesh, blocks, factor, parallel, siblings, flags
-                )
+                refined, n_split = split_long_edges(mesh, blocks, factor, parallel, siblings, flags)
                 count += n_split
                 if refined is mesh:
                     break
@@ -269,11 +267,11 @@ class Sweeps:
         with self.watch.time("collapse"):
             # Only where this sweep made holes: to count them is a pass over all faces. What the guard
             # has seen must keep its numbers.
-            if 8 * self.counts[-1]["collapse"] > n_faces and self.guard is None:
-                if np.count_nonzero(mesh.origin[::3] == DEAD) > _SPARSE * n_faces:
-                    mesh = compact(mesh, blocks, parallel, ROOM)
-                    blocks = make_blocks(mesh)
-                    parallel = self.is_parallel(mesh.origin.size // 3)
+            made_holes = 8 * self.counts[-1]["collapse"] > n_faces and self.guard is None
+            if made_holes and np.count_nonzero(mesh.origin[::3] == DEAD) > _SPARSE * n_faces:
+                mesh = compact(mesh, blocks, parallel, ROOM)
+                blocks = make_blocks(mesh)
+                parallel = self.is_parallel(mesh.origin.size // 3)
         flips = FlipLimits(
             cos(radians(options.flip_normal)), options.delaunay_ties, options.sliver_check
         )

@@ -8,15 +8,14 @@ same block. A split owns the four vertices of its quad.
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
-from .._jit import driver, inlined
+from .._jit import inlined, threaded
 from .._types import CURVE, DEAD, FIXED, HELD, INNER, NONE, SEAM, Blocks, Mesh
-from ..edge_sets import OWNED, REST, SHIFTED, list_range, stage_blocks, stages, vertex_range
+from ..edge_sets import OWNED, SHIFTED, list_range, per_stage_block, stages, vertex_range
 from ..halfedge import following, previous
-from .measure import GONE, EdgeFlags, edge_flags
+from .measure import REMOVED, EdgeFlags, edge_flags
 
-__all__ = ["bisect_edges", "birth_between"]
+__all__ = ["birth_between", "bisect_edges"]
 
 
 def bisect_edges(mesh: Mesh, blocks: Blocks, flags: EdgeFlags, parallel: bool) -> tuple[int, int]:
@@ -41,15 +40,15 @@ def bisect_edges(mesh: Mesh, blocks: Blocks, flags: EdgeFlags, parallel: bool) -
             return n_split, n_left
 
 
-@driver
-def _bisect(mesh, blocks, stage, half_longest, twice_shortest, mask, done, left):
-    for k in prange(stage_blocks(blocks, stage)):
+@threaded(per_stage_block)
+def _bisect(span, mesh, blocks, stage, half_longest, twice_shortest, mask, done, left):
+    for k in range(span[0], span[1]):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
         room, room_end = _face_range(blocks, stage, k)
         v = low
         for f in range(blocks.face[first], blocks.face[end]):
-            if mask[f] & 7 == 0 or mask[f] == GONE:
+            if mask[f] & 7 == 0 or mask[f] == REMOVED:
                 continue
             for i in range(3):
                 if not (mask[f] >> i) & 1:

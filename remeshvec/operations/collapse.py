@@ -11,16 +11,15 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from .._jit import driver, inlined
+from .._jit import inlined, threaded
 from .._types import CURVE, DEAD, FROZEN, INNER, NONE, SEAM, Blocks, FloatArray, Mesh
-from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
+from ..edge_sets import DONE, list_range, per_block, per_stage_block, stages, vertex_range
 from ..geometry import SHARP, distance_squared
 from ..halfedge import following, previous
-from .measure import GONE, EdgeFlags, is_short, measure_edges
 from .guards import folds_over, keeps_curves, keeps_link, makes_sliver, overshoots
+from .measure import REMOVED, EdgeFlags, is_short, measure_edges
 
 __all__ = [
     "COLLAPSED",
@@ -109,13 +108,13 @@ def collapse_short_edges(
     return tally.sum(axis=0)
 
 
-@driver
-def _list_short_edges(mesh, blocks, mask, candidates, count):
-    for k in prange(blocks.face.size - 1):
+@threaded(per_block)
+def _list_short_edges(span, mesh, blocks, mask, candidates, count):
+    for k in range(span[0], span[1]):
         end = 3 * blocks.face[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             short = mask[f] >> 3
-            if short == 0 or mask[f] == GONE:
+            if short == 0 or mask[f] == REMOVED:
                 continue
             for i in range(3):
                 h = 3 * f + i
@@ -124,9 +123,9 @@ def _list_short_edges(mesh, blocks, mask, candidates, count):
         count[k] = end - 3 * blocks.face[k]
 
 
-@driver
-def _collapse(mesh, blocks, stage, limits, candidates, count, tally):
-    for k in prange(stage_blocks(blocks, stage)):
+@threaded(per_stage_block)
+def _collapse(span, mesh, blocks, stage, limits, candidates, count, tally):
+    for k in range(span[0], span[1]):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
         rings = Rings(
@@ -219,7 +218,7 @@ def examine_edge(mesh, h, low, high, limits, rings):
 
 @inlined
 def _overshoots_ahead(mesh, h, x, y, z, s, low, high, half_factor):
-    """Guard of `_survey_ring` for one ring vertex: the third from the end of ``h``, opposite in most rings."""
+    """Guard of `_survey_ring` for the third ring vertex from ``h``, opposite its end in most rings."""
     for _ in range(3):
         if h == NONE:
             return False
@@ -330,7 +329,11 @@ def _quadric_point(mesh, x, y, z, reach, rings, n_a, n_b):
             norm = rings.normal[side, i, 3]
             if norm == 0.0:
                 continue
-            nx, ny, nz = rings.normal[side, i, 0], rings.normal[side, i, 1], rings.normal[side, i, 2]
+            nx, ny, nz = (
+                rings.normal[side, i, 0],
+                rings.normal[side, i, 1],
+                rings.normal[side, i, 2],
+            )
             weight += norm
             nx_unit, ny_unit, nz_unit = nx / norm, ny / norm, nz / norm
             height = nx_unit * dx + ny_unit * dy + nz_unit * dz

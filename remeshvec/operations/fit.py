@@ -10,11 +10,11 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numba import prange
 
-from .._jit import driver
+from .._jit import threaded
 from .._types import DEAD, HELD, INNER, MAX_VALENCE, NONE, Blocks, Mesh, Tree
 from ..bvh import STACK, closest_face, point_on_face
+from ..edge_sets import per_block
 from ..geometry import face_vector
 from ..halfedge import previous
 
@@ -30,11 +30,11 @@ def fit_vertices(mesh: Mesh, blocks: Blocks, tree: Tree, reach: float, parallel:
     _shift(parallel, mesh, blocks, gaps, reach, mesh.X)
 
 
-@driver
-def _measure_gaps(mesh, blocks, tree, gaps):
+@threaded(per_block)
+def _measure_gaps(span, mesh, blocks, tree, gaps):
     """Area vector of every face, and area times signed distance from its centroid to the input."""
     X = mesh.X
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         stack = np.empty((2, STACK), np.int64)
         for f in range(blocks.face[k], blocks.face[k + 1]):
             a = mesh.origin[3 * f]
@@ -59,9 +59,9 @@ def _measure_gaps(mesh, blocks, tree, gaps):
             gaps[f, 0], gaps[f, 1], gaps[f, 2], gaps[f, 3] = nx, ny, nz, gap
 
 
-@driver
-def _shift(mesh, blocks, gaps, reach, X):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _shift(span, mesh, blocks, gaps, reach, X):
+    for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != INNER:
                 continue

@@ -11,11 +11,10 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 
-from .._jit import driver, inlined
+from .._jit import inlined, threaded
 from .._types import CURVE, DEAD, MAX_VALENCE, NONE, Blocks, Mesh
-from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
+from ..edge_sets import DONE, list_range, per_block, per_stage_block, stages, vertex_range
 from ..geometry import distance_squared, face_vector, is_flat, mean_ratio, turn_exceeds
 from ..halfedge import following, previous
 
@@ -65,14 +64,14 @@ def flip_edges(
     return total
 
 
-@driver
-def _find_flips(mesh, blocks, delaunay_ties, candidates, count):
+@threaded(per_block)
+def _find_flips(span, mesh, blocks, delaunay_ties, candidates, count):
     """List the edges worth a flip, by two sieves without branches, which could not be predicted.
 
     A flip takes an edge from both ends and gives one to both apexes. It gains something where three of
     the four are better off, nothing where two are; so of the three in one face at least one is.
     """
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         start = 3 * blocks.face[k]
         end = start
         for f in range(blocks.face[k], blocks.face[k + 1]):
@@ -101,10 +100,10 @@ def _find_flips(mesh, blocks, delaunay_ties, candidates, count):
         count[k] = sieved - start
 
 
-@driver
-def _find_again(mesh, blocks, delaunay_ties, touched, candidates, count):
+@threaded(per_block)
+def _find_again(span, mesh, blocks, delaunay_ties, touched, candidates, count):
     """List what is worth a flip around touched vertices: each edge by one of its two faces."""
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         end = 3 * blocks.face[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             if mesh.origin[3 * f] == DEAD or not _is_touched(mesh, f, touched):
@@ -131,9 +130,9 @@ def _is_wanted(mesh, h, t, delaunay_ties):
     return wanted and mesh.curve[h] == NONE
 
 
-@driver
-def _flip(mesh, blocks, stage, limits, candidates, count, touched, tally):
-    for k in prange(stage_blocks(blocks, stage)):
+@threaded(per_stage_block)
+def _flip(span, mesh, blocks, stage, limits, candidates, count, touched, tally):
+    for k in range(span[0], span[1]):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
         for j in range(first, end):

@@ -9,16 +9,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from .._jit import driver, inlined
+from .._jit import inlined, threaded
 from .._types import DEAD, FROZEN, Blocks, Mesh
+from ..edge_sets import per_block
 from ..geometry import distance_squared, face_vector
 
-__all__ = ["GONE", "EdgeFlags", "edge_flags", "is_short", "measure_edges"]
+__all__ = ["REMOVED", "EdgeFlags", "edge_flags", "is_short", "measure_edges"]
 
-GONE = 255  # flags of a removed face
+REMOVED = 255  # flags of a removed face
 
 
 class EdgeFlags(NamedTuple):
@@ -27,7 +27,7 @@ class EdgeFlags(NamedTuple):
     Parameters
     ----------
     mask : (m,) uint8
-        Bit i: the face wants the edge from corner i split; bit 3 + i: that edge is short; ``GONE``.
+        Bit i: the face wants the edge from corner i split; bit 3 + i: that edge is short; ``REMOVED``.
     n_long : int
         Edges to split, twice where both faces want that.
     n_gone : int
@@ -58,14 +58,14 @@ def measure_edges(
     return EdgeFlags(mask, n_long, n_gone, longest, shortest)
 
 
-@driver
-def _measure(mesh, blocks, half_longest, twice_shortest, mask, count):
-    for k in prange(blocks.face.size - 1):
+@threaded(per_block)
+def _measure(span, mesh, blocks, half_longest, twice_shortest, mask, count):
+    for k in range(span[0], span[1]):
         n_long = 0
         n_gone = 0
         for f in range(blocks.face[k], blocks.face[k + 1]):
             if mesh.origin[3 * f] == DEAD:
-                mask[f] = GONE
+                mask[f] = REMOVED
                 n_gone += 1
                 continue
             flags = edge_flags(mesh, f, half_longest, twice_shortest)
@@ -78,7 +78,7 @@ def _measure(mesh, blocks, half_longest, twice_shortest, mask, count):
 
 @inlined
 def edge_flags(mesh, f, half_longest, twice_shortest):
-    """Flags of one face, see `EdgeFlags`."""
+    """Compute the flags of one face, see `EdgeFlags`."""
     X = mesh.X
     a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
     l0 = distance_squared(X, a, b)

@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 
-from .._jit import driver, inlined
+from .._jit import inlined, threaded
 from .._types import (
     CURVE,
     DEAD,
@@ -27,6 +26,7 @@ from .._types import (
     Tree,
 )
 from ..bvh import STACK, closest_face, point_on_face, search_face, walk_to_face
+from ..edge_sets import per_block
 from ..geometry import face_vector
 from ..halfedge import following, previous
 from ..polyline import closest_on_curve
@@ -97,9 +97,9 @@ def read_lengths(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: boo
     )
 
 
-@driver
-def _project_inner(mesh, blocks, tree, trust, before, X, birth):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _project_inner(span, mesh, blocks, tree, trust, before, X, birth):
+    for k in range(span[0], span[1]):
         stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != INNER:
@@ -134,9 +134,9 @@ def _ring_normal(mesh, X, v):
     return sx, sy, sz
 
 
-@driver
-def _project_curves(mesh, blocks, X_in, origin, beside, X, birth):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _project_curves(span, mesh, blocks, X_in, origin, beside, X, birth):
+    for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != CURVE:
                 continue
@@ -150,9 +150,9 @@ def _project_curves(mesh, blocks, X_in, origin, beside, X, birth):
                 X[v, i] = X_in[a, i] + s * (X_in[b, i] - X_in[a, i])
 
 
-@driver
-def _locate(mesh, blocks, tree, X_in, origin, beside, trust, birth, barycentric):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _locate(span, mesh, blocks, tree, X_in, origin, beside, trust, birth, barycentric):
+    for k in range(span[0], span[1]):
         stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD:
@@ -174,9 +174,9 @@ def _locate(mesh, blocks, tree, X_in, origin, beside, trust, birth, barycentric)
             barycentric[v, (corner + 1) % 3] = s
 
 
-@driver
-def _read_lengths(mesh, blocks, X_in, origin, birth, weights, X):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _read_lengths(span, mesh, blocks, X_in, origin, birth, weights, X):
+    for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] != DEAD and mesh.kind[v] != FIXED:
                 f = np.int64(birth[v]) // 3

@@ -13,10 +13,10 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numba import prange
 
-from .._jit import add_four, add_row, driver, inlined, kernel
+from .._jit import add_four, add_row, inlined, kernel, threaded
 from .._types import CURVE, DEAD, INNER, NONE, Blocks, Mesh
+from ..edge_sets import per_block
 from ..geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
 
 __all__ = ["relax_vertices"]
@@ -45,10 +45,10 @@ def relax_vertices(mesh: Mesh, blocks: Blocks, stiffness: float, parallel: bool)
     _move(parallel, mesh, blocks, stiffness, sums, mesh.X)
 
 
-@driver
-def _sum_areas(mesh, blocks, weighted, across, count):
+@threaded(per_block)
+def _sum_areas(span, mesh, blocks, weighted, across, count):
     """Mixed Voronoi areas from the faces inside a block; lists the faces across borders."""
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         low = blocks.vertex[k]
         high = blocks.vertex[k + 1]
         for v in range(low, high):
@@ -96,11 +96,11 @@ def _add_areas(X, a, b, c, weighted):
     weighted[c, 3] += area_c
 
 
-@driver
-def _weight(mesh, blocks, weighted):
+@threaded(per_block)
+def _weight(span, mesh, blocks, weighted):
     """Divide areas by the squared target length, and multiply positions by that."""
     X = mesh.X
-    for k in prange(blocks.vertex.size - 1):
+    for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             weight = weighted[v, 3] / (X[v, 3] * X[v, 3])
             # Half of the cell of a boundary vertex is missing: counted so, it would let its neighbours
@@ -113,9 +113,9 @@ def _weight(mesh, blocks, weighted):
             weighted[v, 3] = weight
 
 
-@driver
-def _sum_rings(mesh, blocks, stiffness, weighted, sums):
-    for k in prange(blocks.face.size - 1):
+@threaded(per_block)
+def _sum_rings(span, mesh, blocks, stiffness, weighted, sums):
+    for k in range(span[0], span[1]):
         low = blocks.vertex[k]
         high = blocks.vertex[k + 1]
         sums[low:high] = 0.0
@@ -163,9 +163,9 @@ def _add_face(X, weighted, a, b, c, stiffness, sums):
         sums[c, 12] += yz
 
 
-@driver
-def _move(mesh, blocks, stiffness, sums, X):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _move(span, mesh, blocks, stiffness, sums, X):
+    for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] != DEAD and mesh.kind[v] == INNER:
                 dx, dy, dz = _step(X, v, sums, stiffness)

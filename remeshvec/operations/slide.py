@@ -8,10 +8,10 @@ all sheets that share a curve compute the same bits.
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
-from .._jit import driver, inlined
+from .._jit import inlined, threaded
 from .._types import CURVE, DEAD, FIXED, MAX_VALENCE, NONE, Blocks, Mesh
+from ..edge_sets import per_block
 from ..halfedge import following, previous
 from ..polyline import move_on_curve
 from .project import Reference, project_curves
@@ -32,10 +32,10 @@ def slide_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: b
     _slide(parallel, mesh, blocks, *reference[1:], arc, mesh.X, mesh.birth)
 
 
-@driver
-def _find_arcs(mesh, blocks, X_in, origin, arcs, arc):
+@threaded(per_block)
+def _find_arcs(span, mesh, blocks, X_in, origin, arcs, arc):
     """Arc length at which each vertex lies on its curve."""
-    for k in prange(blocks.vertex.size - 1):
+    for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] < CURVE or mesh.kind[v] == FIXED:
                 continue
@@ -52,9 +52,9 @@ def _find_arcs(mesh, blocks, X_in, origin, arcs, arc):
             arc[v] = arcs[0, h] + s * (arcs[1, h] - arcs[0, h])
 
 
-@driver
-def _slide(mesh, blocks, X_in, origin, beside, arcs, arc, X, birth):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _slide(span, mesh, blocks, X_in, origin, beside, arcs, arc, X, birth):
+    for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != CURVE:
                 continue

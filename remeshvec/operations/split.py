@@ -10,13 +10,13 @@ half-edge order never ends: a long neighbour moves to a new slot again and again
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
-from .._jit import driver, inlined, kernel
+from .._jit import inlined, kernel, threaded
 from .._types import CURVE, DEAD, INNER, NONE, Blocks, IndexArray, Mesh
+from ..edge_sets import per_block
 from ..geometry import distance_squared
 from .bisect import birth_between, bisect_edges
-from .measure import GONE, EdgeFlags, measure_edges
+from .measure import REMOVED, EdgeFlags, measure_edges
 
 __all__ = ["MAX_ROUNDS", "ROOM", "compact", "split_edges", "split_long_edges"]
 
@@ -119,7 +119,7 @@ def split_long_edges(
 def split_edges(mesh: Mesh, blocks: Blocks, edges: IndexArray, parallel: bool) -> Mesh:
     """Split the given half-edges, whatever their length."""
     asked = np.zeros(mesh.origin.size // 3, np.uint8)
-    asked[mesh.origin[::3] == DEAD] = GONE
+    asked[mesh.origin[::3] == DEAD] = REMOVED
     np.bitwise_or.at(asked, edges // 3, (1 << (edges % 3)).astype(np.uint8))
     return _refine(mesh, blocks, asked, parallel)[0]
 
@@ -139,7 +139,7 @@ def compact(mesh: Mesh, blocks: Blocks, parallel: bool, room: float = 0.0) -> Me
     ``room`` is left free for splits in place, as a share of the faces.
     """
     asked = np.zeros(mesh.origin.size // 3, np.uint8)
-    asked[mesh.origin[::3] == DEAD] = GONE
+    asked[mesh.origin[::3] == DEAD] = REMOVED
     return _refine(mesh, blocks, asked, parallel, room, False)[0]
 
 
@@ -187,21 +187,21 @@ def _refine(
     return refined, n_split
 
 
-@driver
-def _mark_edges(mesh, blocks, asked, splits, mask, sizes):
+@threaded(per_block)
+def _mark_edges(span, mesh, blocks, asked, splits, mask, sizes):
     """Template of every face: mask of the edges that it or a neighbour wants split, and the diagonal.
 
     Bits 4 to 6 say which of the corners' vertices follow this face. Sizes per block: children, vertices
     owned, edges split.
     """
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         children = 0
         owned = 0
         split = 0
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(asked[f])
-            if m == GONE:
-                mask[f] = GONE
+            if m == REMOVED:
+                mask[f] = REMOVED
                 continue
             m &= 7
             if splits:
@@ -242,15 +242,15 @@ def _choose_diagonal(mesh, f, m):
     return m
 
 
-@driver
-def _number(mesh, blocks, mask, ends, first_child, new_vertex, middle):
+@threaded(per_block)
+def _number(span, mesh, blocks, mask, ends, first_child, new_vertex, middle):
     """Give children, vertices and midpoints the order of the half-edges that own them."""
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         child = ends[k, 0]
         vertex = ends[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
-            if m == GONE:
+            if m == REMOVED:
                 continue
             first_child[f] = child
             child += _COUNT[m & 15]
@@ -267,19 +267,19 @@ def _number(mesh, blocks, mask, ends, first_child, new_vertex, middle):
                     vertex += 1
 
 
-@driver
+@threaded(per_block)
 def _write(
-    mesh, blocks, ends, mask, first_child, new_vertex, middle,
+    span, mesh, blocks, ends, mask, first_child, new_vertex, middle,
     origin, twin, curve, source, halfedge, excess, X, kind, birth,
 ):  # fmt: skip
     """Write the children of every face and the vertices that follow it; what is left free is dead."""
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         ids = np.empty(6, np.int64)
         face = ends[k, 0]
         vertex = ends[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
-            if m == GONE:
+            if m == REMOVED:
                 continue
             owned = m >> 4
             m &= 15
@@ -297,7 +297,9 @@ def _write(
                     ids[i] = new_vertex[mesh.origin[h]]
                     if (m >> i) & 1:
                         ids[3 + i] = middle[max(h, np.int64(mesh.twin[h]))]
-                _write_children(mesh, f, m, base, ids, mask, first_child, origin, twin, curve, source)
+                _write_children(
+                    mesh, f, m, base, ids, mask, first_child, origin, twin, curve, source
+                )
             if owned == 0 and m == 0:
                 continue
             for i in range(3):
@@ -362,16 +364,28 @@ def _part_of(h, half, mask, first_child):
     return 3 * np.int64(first_child[f]) + (i if m == 0 else _PART[m, 2 * i + half])
 
 
-@driver
+@threaded(per_block)
 def _write_vertices(
-    mesh, blocks, ends, mask, first_child, new_vertex, middle, halfedge, excess, X, kind, birth
+    span,
+    mesh,
+    blocks,
+    ends,
+    mask,
+    first_child,
+    new_vertex,
+    middle,
+    halfedge,
+    excess,
+    X,
+    kind,
+    birth,
 ):
     """Copy the vertices and put midpoints between them, each from the half-edge that owns it."""
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         end = ends[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             m = np.int64(mask[f])
-            if m == GONE:
+            if m == REMOVED:
                 continue
             base = 3 * np.int64(first_child[f])
             for i in range(3):
@@ -413,7 +427,7 @@ def _update_valences(mesh, mask, new_vertex, middle, refined):
     """
     for f in range(mask.size):
         m = np.int64(mask[f]) & 15
-        if m == 0 or mask[f] == GONE:
+        if m == 0 or mask[f] == REMOVED:
             continue
         for i in range(3):
             h = 3 * f + i

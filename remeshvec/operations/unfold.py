@@ -8,10 +8,10 @@ taken back: that would keep the folds of the input.
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
 
-from .._jit import driver
+from .._jit import threaded
 from .._types import CURVE, DEAD, INNER, Blocks, FloatArray, Mesh
+from ..edge_sets import per_block
 from ..geometry import face_vector, turn_exceeds
 
 __all__ = ["undo_folds"]
@@ -47,11 +47,11 @@ def undo_folds(mesh: Mesh, blocks: Blocks, before: FloatArray, parallel: bool) -
         total += int(count.sum())
 
 
-@driver
-def _find_folds(mesh, blocks, before, marked, found):
+@threaded(per_block)
+def _find_folds(span, mesh, blocks, before, marked, found):
     """Mark the corners of folded faces; blocks may mark the same vertex, with the same value."""
     X = mesh.X
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         for f in range(blocks.face[k], blocks.face[k + 1]):
             a = mesh.origin[3 * f]
             if a == DEAD:
@@ -75,9 +75,9 @@ def _find_folds(mesh, blocks, before, marked, found):
                 found[k] += 1
 
 
-@driver
-def _put_back(mesh, blocks, before, marked, X, count):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _put_back(span, mesh, blocks, before, marked, X, count):
+    for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if marked[v] == 0:
                 continue

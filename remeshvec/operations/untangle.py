@@ -12,13 +12,12 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from .._jit import driver, inlined
+from .._jit import inlined, threaded
 from .._types import DEAD, INNER, NONE, Blocks, IndexArray, Mesh, Tree
 from ..bvh import point_on_face, walk_to_face
-from ..edge_sets import DONE, list_range, stage_blocks, stages, vertex_range
+from ..edge_sets import DONE, list_range, per_block, per_stage_block, stages, vertex_range
 from ..geometry import distance_squared, face_vector, tangent_basis, turn_exceeds
 from ..halfedge import following, previous
 
@@ -38,7 +37,13 @@ _DIRECTIONS = np.stack(
 
 
 def untangle_vertices(
-    mesh: Mesh, blocks: Blocks, tree: Tree, on_surface: bool, limit: float, rounds: int, parallel: bool
+    mesh: Mesh,
+    blocks: Blocks,
+    tree: Tree,
+    on_surface: bool,
+    limit: float,
+    rounds: int,
+    parallel: bool,
 ) -> int:
     """Improve rings with an angle below ``acos(limit)``; returns how many vertices moved.
 
@@ -109,14 +114,14 @@ def _search_rings(
             )  # fmt: skip
 
 
-@driver
-def _mark_bad_faces(mesh, blocks, limit, moved, bad, near):
+@threaded(per_block)
+def _mark_bad_faces(span, mesh, blocks, limit, moved, bad, near):
     """Mark the corners of faces with a small angle, and those of faces with a moved corner.
 
     Blocks may mark the same vertex, with the same value.
     """
     X = mesh.X
-    for k in prange(blocks.face.size - 1):
+    for k in range(span[0], span[1]):
         for f in range(blocks.face[k], blocks.face[k + 1]):
             a = mesh.origin[3 * f]
             if a == DEAD:
@@ -141,9 +146,9 @@ def _mark_bad_faces(mesh, blocks, limit, moved, bad, near):
                 bad[c] = 1
 
 
-@driver
-def _list_marked(mesh, blocks, bad, near, candidates, count):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _list_marked(span, mesh, blocks, bad, near, candidates, count):
+    for k in range(span[0], span[1]):
         end = blocks.vertex[k]
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             candidates[end] = v
@@ -151,9 +156,9 @@ def _list_marked(mesh, blocks, bad, near, candidates, count):
         count[k] = end - blocks.vertex[k]
 
 
-@driver
-def _find_far_rings(mesh, blocks, tree, limit, weight, candidates, count):
-    for k in prange(blocks.vertex.size - 1):
+@threaded(per_block)
+def _find_far_rings(span, mesh, blocks, tree, limit, weight, candidates, count):
+    for k in range(span[0], span[1]):
         ring = np.empty((_CAPACITY, 3))
         end = blocks.vertex[k]
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
@@ -172,9 +177,9 @@ def _find_far_rings(mesh, blocks, tree, limit, weight, candidates, count):
         count[k] = end - blocks.vertex[k]
 
 
-@driver
-def _untangle(mesh, blocks, stage, tree, on_surface, limit, weight, candidates, count, moved):
-    for k in prange(stage_blocks(blocks, stage)):
+@threaded(per_stage_block)
+def _untangle(span, mesh, blocks, stage, tree, on_surface, limit, weight, candidates, count, moved):
+    for k in range(span[0], span[1]):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
         ring = np.empty((_CAPACITY, 3))
