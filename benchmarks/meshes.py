@@ -1,11 +1,14 @@
 """The meshes of the benchmarks, by name.
 
-``creature`` is a file; ``creature-x16`` is made from it, with 16 times the faces.
+``creature`` is a file; ``creature-x16`` is made from it, with 16 times the faces;
+``creature-x16@0.5`` is remeshed to half its mean edge length instead of 0.9 times.
 """
 
 from __future__ import annotations
 
+import re
 from functools import cache
+from math import isqrt
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +18,8 @@ from numpy.typing import NDArray
 from remeshvec import quality
 from remeshvec.mesh_files import read_mesh
 
+from .generate import cut_finer
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -23,9 +28,10 @@ FOLDERS = (ROOT / "data", ROOT.parent / "shared" / "data" / "samples")
 
 DATA = ("creature", "bracket", "wavy_sheet", "pretzel", "linked_rings", "thin_sheet")
 SAMPLES = ("cat", "iphi_bad10k", "phands", "cow", "wolf_head")
-LARGE = ("creature-x16", "creature-x64")  # 166,400 and 665,600 faces
 
 LENGTH_FACTOR = 0.9  # target length / mean edge length
+
+NAME = re.compile(r"(?P<file>[\w.]+)(-x(?P<times>\d+))?(@(?P<factor>[\d.]+))?")
 
 
 class Sample(NamedTuple):
@@ -47,7 +53,13 @@ def find_file(name: str) -> Path | None:
     return next((path for folder in FOLDERS for path in sorted(folder.glob(f"{name}.o*"))), None)
 
 
-@cache
+def made(times: int, factor: float = LENGTH_FACTOR) -> str:
+    """Name the mesh with so many times 10,000 faces, of which ``times`` is a square."""
+    base = "iphi_bad10k" if find_file("iphi_bad10k") else "creature"
+    finer = f"-x{times}" if times > 1 else ""
+    return f"{base}{finer}" + (f"@{factor:g}" if factor != LENGTH_FACTOR else "")
+
+
 def load(name: str) -> Sample:
     """Read or make a mesh.
 
@@ -56,31 +68,23 @@ def load(name: str) -> Sample:
     SystemExit
         There is no such mesh.
     """
-    base, _, factor = name.partition("-x")
-    path = find_file(base)
+    match = NAME.fullmatch(name)
+    if match is None:
+        raise SystemExit(f"{name!r} is no name of a mesh, as cat, cat-x16 or cat-x16@0.5")
+    V, F, mean = _arrays(match["file"], int(match["times"] or 1))
+    return Sample(name, V, F, float(match["factor"] or LENGTH_FACTOR) * mean)
+
+
+@cache
+def _arrays(file: str, times: int) -> tuple[FloatArray, IntArray, float]:
+    """Vertices, faces, and mean edge length."""
+    path = find_file(file)
     if path is None:
-        raise SystemExit(f"no mesh {base!r} in {' or '.join(f.name for f in FOLDERS)}")
+        raise SystemExit(f"no mesh {file!r} in {' or '.join(f.name for f in FOLDERS)}")
+    n = isqrt(times)
+    if n * n != times or n == 0:
+        raise SystemExit(f"{file}-x{times}: a face is cut into a square number of faces")
     V, F, _ = read_mesh(path)
-    if factor:
-        V, F = upsampled(V, F, cuts=round(np.log(int(factor)) / np.log(4)))
-    return Sample(name, V, F, LENGTH_FACTOR * quality(V, F).edge_mean)
-
-
-def upsampled(
-    V: FloatArray, F: IntArray, cuts: int, noise: float = 0.25, seed: int = 0
-) -> tuple[FloatArray, IntArray]:
-    """Cut every face into ``4 ** cuts``, then move inner vertices at random in their tangent planes.
-
-    ``noise`` is the largest step in each direction, in mean edge lengths of the result. The noise
-    makes the mesh irregular everywhere: without it most vertices would have six equal faces around
-    them, and a remesher little to do.
-    """
-    import igl
-
-    for _ in range(cuts):
-        V, F = igl.upsample(V, F)
-    normals = np.nan_to_num(igl.per_vertex_normals(V, F))
-    step = np.random.default_rng(seed).uniform(-noise, noise, V.shape) * quality(V, F).edge_mean
-    step -= (step * normals).sum(axis=1, keepdims=True) * normals
-    step[np.unique(igl.boundary_facets(F)[0])] = 0.0
-    return V + step, F
+    if n > 1:
+        V, F = cut_finer(V, F, n)
+    return V, F, quality(V, F).edge_mean

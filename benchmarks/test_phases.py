@@ -1,4 +1,4 @@
-"""Times of single phases and of whole calls: ``pytest benchmarks``.
+"""Times of single phases: ``pytest benchmarks``.
 
 A phase is timed on what the default preset hands to its first call, serially, from a fresh copy each
 round.
@@ -30,12 +30,6 @@ PHASES = {
     "project": "project_vertices",
     "unfold": "undo_folds",
 }
-CALLS: dict[str, dict[str, Any]] = {
-    "fast-no-projection": {"preset": "fast", "project": False},
-    "fast": {"preset": "fast"},
-    "default": {},
-    "fine": {"preset": "fine"},
-}
 ROUNDS = 20
 
 # The module that calls the phases.
@@ -51,23 +45,6 @@ def test_phase(benchmark: Any, phase: str, mesh: str) -> None:
     function = getattr(MODULE, PHASES[phase])
     function(*copied(arguments))  # warm
     benchmark.pedantic(function, setup=lambda: (copied(arguments), {}), rounds=ROUNDS)
-
-
-@pytest.mark.parametrize("mesh", DATA)
-@pytest.mark.parametrize("options", CALLS)
-def test_whole_call(benchmark: Any, options: str, mesh: str) -> None:
-    """One call of ``remesh`` on one thread."""
-    benchmark.group = f"remesh, {options}"
-    sample = load(mesh)
-    result = benchmark.pedantic(
-        remesh,
-        args=(sample.V, sample.F, sample.length),
-        kwargs={"threads": 1, **CALLS[options]},
-        rounds=ROUNDS // 4,
-        warmup_rounds=1,
-    )
-    assert len(result.F) > 0
-    benchmark.extra_info["faces"] = len(result.F)
 
 
 @cache
