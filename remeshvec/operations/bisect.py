@@ -61,10 +61,11 @@ def _bisect(span, mesh, blocks, stage, half_longest, twice_shortest, mask, done,
                 v = _next_dead(mesh.vertex_halfedge, 1, v, high)
                 room = _next_dead(mesh.origin, 3, room, room_end)
                 other = _next_dead(mesh.origin, 3, room + 1, room_end) if is_inner else room
-                left[k] += 1  # what was too long may have long halves
-                if v < high and max(room, other) < room_end:
-                    _split_edge(mesh, h, v, room, other, half_longest, twice_shortest, mask)
-                    done[k] += 1
+                if v == high or max(room, other) >= room_end:
+                    left[k] += 1
+                    continue
+                done[k] += 1
+                left[k] += _split_edge(mesh, h, v, room, other, half_longest, twice_shortest, mask)
 
 
 @inlined
@@ -104,7 +105,10 @@ def _is_owned(mesh, h, low, high):
 
 @inlined
 def _split_edge(mesh, h, v, f, g, half_longest, twice_shortest, mask):
-    """Put vertex ``v`` in the middle of an edge, with new faces ``f`` and, across it, ``g``."""
+    """Put vertex ``v`` in the middle of an edge, with new faces ``f`` and, across it, ``g``.
+
+    Tells whether one of the four faces wants more splits.
+    """
     h = max(h, np.int64(mesh.twin[h]))  # as in `split`, the later half-edge gives the birth
     t = np.int64(mesh.twin[h])
     a = np.int64(mesh.origin[h])
@@ -126,6 +130,10 @@ def _split_edge(mesh, h, v, f, g, half_longest, twice_shortest, mask):
         mask[g] = edge_flags(mesh, g, half_longest, twice_shortest)
     mask[h // 3] = edge_flags(mesh, h // 3, half_longest, twice_shortest)
     mask[f] = edge_flags(mesh, f, half_longest, twice_shortest)
+    wanted = mask[h // 3] | mask[f]
+    if t != NONE:
+        wanted |= mask[t // 3] | mask[g]
+    return (wanted & 7) != 0
 
 
 @inlined

@@ -14,9 +14,9 @@ from math import sqrt
 
 import numpy as np
 
-from .._jit import add_four, add_row, inlined, kernel, threaded
+from .._jit import add_four, add_row, inlined, threaded
 from .._types import CURVE, DEAD, INNER, NONE, Blocks, Mesh
-from ..edge_sets import per_block
+from ..edge_sets import SHIFTED, list_range, per_block, per_stage_block, stages, vertex_range
 from ..geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
 
 __all__ = ["relax_vertices"]
@@ -38,10 +38,12 @@ def relax_vertices(mesh: Mesh, blocks: Blocks, stiffness: float, parallel: bool)
     across = np.empty(mesh.origin.size // 3, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
     _sum_areas(parallel, mesh, blocks, weighted, across, count)
-    _sum_areas_across(mesh, blocks, weighted, across, count)
+    for stage in stages(blocks)[1:]:
+        _sum_areas_across(parallel, mesh, blocks, stage, weighted, across, count)
     _weight(parallel, mesh, blocks, weighted)
     _sum_rings(parallel, mesh, blocks, stiffness, weighted, sums)
-    _sum_rings_across(mesh, blocks, stiffness, weighted, across, count, sums)
+    for stage in stages(blocks)[1:]:
+        _sum_rings_across(parallel, mesh, blocks, stage, stiffness, weighted, across, count, sums)
     _move(parallel, mesh, blocks, stiffness, sums, mesh.X)
 
 
@@ -68,15 +70,27 @@ def _sum_areas(span, mesh, blocks, weighted, across, count):
         count[k] = end - blocks.face[k]
 
 
-@kernel
-def _sum_areas_across(mesh, blocks, weighted, across, count):
-    for k in range(blocks.face.size - 1):
-        for i in range(blocks.face[k], blocks.face[k] + count[k]):
-            f = across[i]
-            a = mesh.origin[3 * f]
-            b = mesh.origin[3 * f + 1]
-            c = mesh.origin[3 * f + 2]
-            _add_areas(mesh.X, a, b, c, weighted)
+@threaded(per_stage_block)
+def _sum_areas_across(span, mesh, blocks, stage, weighted, across, count):
+    """Add the faces across borders; those that a shifted block took are marked by a negative sign."""
+    for k in range(span[0], span[1]):
+        low, high = vertex_range(blocks, stage, k)
+        first, end = list_range(blocks, stage, k)
+        for j in range(first, end):
+            for i in range(blocks.face[j], blocks.face[j] + count[j]):
+                f = np.int64(across[i])
+                if f >= 0 and _has_corners_in(mesh, f, low, high):
+                    _add_areas(
+                        mesh.X, mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2],
+                        weighted,
+                    )  # fmt: skip
+                    across[i] = ~f if stage == SHIFTED else f
+
+
+@inlined
+def _has_corners_in(mesh, f, low, high):
+    a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
+    return min(a, b, c) >= low and max(a, b, c) < high
 
 
 @inlined
@@ -127,15 +141,22 @@ def _sum_rings(span, mesh, blocks, stiffness, weighted, sums):
                 _add_face(mesh.X, weighted, a, b, c, stiffness, sums)
 
 
-@kernel
-def _sum_rings_across(mesh, blocks, stiffness, weighted, across, count, sums):
-    for k in range(blocks.face.size - 1):
-        for i in range(blocks.face[k], blocks.face[k] + count[k]):
-            f = across[i]
-            a = mesh.origin[3 * f]
-            b = mesh.origin[3 * f + 1]
-            c = mesh.origin[3 * f + 2]
-            _add_face(mesh.X, weighted, a, b, c, stiffness, sums)
+@threaded(per_stage_block)
+def _sum_rings_across(span, mesh, blocks, stage, stiffness, weighted, across, count, sums):
+    """Add the faces across borders, in the stage in which `_sum_areas_across` did."""
+    for k in range(span[0], span[1]):
+        low, high = vertex_range(blocks, stage, k)
+        first, end = list_range(blocks, stage, k)
+        for j in range(first, end):
+            for i in range(blocks.face[j], blocks.face[j] + count[j]):
+                f = np.int64(across[i])
+                if stage == SHIFTED:
+                    f = ~f
+                if f >= 0 and _has_corners_in(mesh, f, low, high):
+                    _add_face(
+                        mesh.X, weighted, mesh.origin[3 * f], mesh.origin[3 * f + 1],
+                        mesh.origin[3 * f + 2], stiffness, sums,
+                    )  # fmt: skip
 
 
 @inlined

@@ -183,7 +183,10 @@ def _refine(
     numbers = (mask, first_child, new_vertex, middle)
     _write(parallel, mesh, blocks, ends, *numbers, *refined)
     if n_split:
-        _update_valences(mesh, mask, new_vertex, middle, refined)
+        across, count = np.empty(mask.size, np.int32), np.zeros(len(sizes), np.int64)
+        changes = (mask, new_vertex, middle, refined.valence_excess, across, count)
+        _update_valences(parallel, mesh, blocks, *changes)
+        _update_valences_across(mesh, blocks, *changes)
     return refined, n_split
 
 
@@ -419,19 +422,41 @@ def _write_vertices(
             X[v] = 1.0
 
 
-@kernel
-def _update_valences(mesh, mask, new_vertex, middle, refined):
-    """Add what the children of split faces bring; serial, because faces share vertices.
+@threaded(per_block)
+def _update_valences(span, mesh, blocks, mask, new_vertex, middle, excess, across, count):
+    """Add what the children of split faces bring; lists the faces whose vertices are not all the block's.
 
-    2 ns a face, and a pass over bytes where nothing was split.
+    A midpoint belongs to the block of both ends of its edge.
     """
-    for f in range(mask.size):
-        m = np.int64(mask[f]) & 15
-        if m == 0 or mask[f] == REMOVED:
-            continue
-        for i in range(3):
-            h = 3 * f + i
-            refined.valence_excess[new_vertex[mesh.origin[h]]] += _GAIN[m, i]
-            if (m >> i) & 1:
-                owner = max(h, np.int64(mesh.twin[h]))
-                refined.valence_excess[middle[owner]] += _GAIN[m, 3 + i]
+    for k in range(span[0], span[1]):
+        low = blocks.vertex[k]
+        high = blocks.vertex[k + 1]
+        end = blocks.face[k]
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            m = np.int64(mask[f]) & 15
+            if m == 0 or mask[f] == REMOVED:
+                continue
+            a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
+            if min(a, b, c) >= low and max(a, b, c) < high:
+                _add_gains(mesh, f, m, new_vertex, middle, excess)
+            else:
+                across[end] = f
+                end += 1
+        count[k] = end - blocks.face[k]
+
+
+@kernel
+def _update_valences_across(mesh, blocks, mask, new_vertex, middle, excess, across, count):
+    for k in range(blocks.face.size - 1):
+        for i in range(blocks.face[k], blocks.face[k] + count[k]):
+            f = np.int64(across[i])
+            _add_gains(mesh, f, np.int64(mask[f]) & 15, new_vertex, middle, excess)
+
+
+@inlined
+def _add_gains(mesh, f, m, new_vertex, middle, excess):
+    for i in range(3):
+        h = 3 * f + i
+        excess[new_vertex[mesh.origin[h]]] += _GAIN[m, i]
+        if (m >> i) & 1:
+            excess[middle[max(h, np.int64(mesh.twin[h]))]] += _GAIN[m, 3 + i]

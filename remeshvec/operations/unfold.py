@@ -35,12 +35,17 @@ def undo_folds(mesh: Mesh, blocks: Blocks, before: FloatArray, parallel: bool) -
     """
     total = 0
     marked = np.zeros(mesh.vertex_halfedge.size, np.uint8)
+    faces = np.empty(mesh.origin.size // 3, np.int32)
+    n_faces = np.zeros(len(blocks.face) - 1, np.int64)
+    _list_faces_at_curves(parallel, mesh, blocks, faces, n_faces)
+    if not n_faces.any():
+        return 0
     while True:
-        found = np.zeros(len(blocks.face) - 1, np.int64)
-        _find_folds(parallel, mesh, blocks, before, marked, found)
+        found = np.zeros(len(n_faces), np.int64)
+        _find_folds(parallel, mesh, blocks, before, faces, n_faces, marked, found)
         if not found.any():
             return total
-        count = np.zeros(len(blocks.face) - 1, np.int64)
+        count = np.zeros(len(n_faces), np.int64)
         _put_back(parallel, mesh, blocks, before, marked, mesh.X, count)
         if not count.any():
             return total
@@ -48,18 +53,29 @@ def undo_folds(mesh: Mesh, blocks: Blocks, before: FloatArray, parallel: bool) -
 
 
 @threaded(per_block)
-def _find_folds(span, mesh, blocks, before, marked, found):
+def _list_faces_at_curves(span, mesh, blocks, faces, n_faces):
+    for k in range(span[0], span[1]):
+        end = blocks.face[k]
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            a = mesh.origin[3 * f]
+            if a != DEAD:
+                b = mesh.origin[3 * f + 1]
+                c = mesh.origin[3 * f + 2]
+                faces[end] = f
+                end += max(mesh.kind[a], mesh.kind[b], mesh.kind[c]) >= CURVE
+        n_faces[k] = end - blocks.face[k]
+
+
+@threaded(per_block)
+def _find_folds(span, mesh, blocks, before, faces, n_faces, marked, found):
     """Mark the corners of folded faces; blocks may mark the same vertex, with the same value."""
     X = mesh.X
     for k in range(span[0], span[1]):
-        for f in range(blocks.face[k], blocks.face[k + 1]):
+        for i in range(blocks.face[k], blocks.face[k] + n_faces[k]):
+            f = faces[i]
             a = mesh.origin[3 * f]
-            if a == DEAD:
-                continue
             b = mesh.origin[3 * f + 1]
             c = mesh.origin[3 * f + 2]
-            if max(mesh.kind[a], mesh.kind[b], mesh.kind[c]) < CURVE:
-                continue
             ux, uy, uz = face_vector(
                 before[a, 0], before[a, 1], before[a, 2],
                 before[b, 0], before[b, 1], before[b, 2],
