@@ -62,6 +62,7 @@ class Rings(NamedTuple):
     vertex: NDArray[np.int64]  # (2, k) ring vertices; one more than faces around a boundary vertex
     point: FloatArray  # (2, k, 4) their coordinates and target lengths
     normal: FloatArray  # (2, k, 4) area vectors of the faces and their lengths
+    size: NDArray[np.int64]  # (2, 2) faces, and ring vertices
 
 
 def make_rings() -> Rings:
@@ -71,6 +72,7 @@ def make_rings() -> Rings:
         np.empty((2, RING_CAPACITY), np.int64),
         np.empty((2, RING_CAPACITY, 4)),
         np.empty((2, RING_CAPACITY, 4)),
+        np.empty((2, 2), np.int64),
     )
 
 
@@ -133,6 +135,7 @@ def _collapse(span, mesh, blocks, stage, limits, candidates, count, tally):
             np.empty((2, RING_CAPACITY), np.int64),
             np.empty((2, RING_CAPACITY, 4)),
             np.empty((2, RING_CAPACITY, 4)),
+            np.empty((2, 2), np.int64),
         )
         for j in range(first, end):
             for i in range(3 * blocks.face[j], 3 * blocks.face[j] + count[j]):
@@ -182,34 +185,23 @@ def examine_edge(mesh, h, low, high, limits, rings):
     x, y, z, s = _meeting_point(mesh, a, b, False, False)
     half = 0.5 * limits.longest
     slack = _CURVE_SLACK if min(mesh.kind[a], mesh.kind[b]) == CURVE else 1.0
-    if slack == 1.0 and (
-        _overshoots_ahead(mesh, h, x, y, z, s, low, high, half)
-        or _overshoots_ahead(mesh, np.int64(mesh.twin[h]), x, y, z, s, low, high, half)
-    ):
+    if slack == 1.0 and _overshoots_ahead(mesh, h, x, y, z, s, low, high, half):
         return KEPT_OVERSHOOT, 0.0, 0.0, 0.0, 0.0, 0, 0
-    n_a, m_a = _survey_ring(mesh, a, b, x, y, z, s, low, high, half, slack, rings, 0)
-    if n_a <= 0:
-        return -n_a, 0.0, 0.0, 0.0, 0.0, 0, 0
-    n_b, m_b = _survey_ring(mesh, b, a, x, y, z, s, low, high, half, slack, rings, 1)
-    if n_b <= 0:
-        return -n_b, 0.0, 0.0, 0.0, 0.0, 0, 0
-    if not keeps_link(mesh, h, rings.vertex, n_a, m_a, n_b, m_b):
+    refused = _survey_rings(mesh, a, b, x, y, z, s, low, high, half, slack, rings)
+    if refused != COLLAPSED:
+        return refused, 0.0, 0.0, 0.0, 0.0, 0, 0
+    n_a, n_b = rings.size[0, 0], rings.size[1, 0]
+    if not keeps_link(mesh, h, rings):
         return KEPT_LINK, 0.0, 0.0, 0.0, 0.0, 0, 0
-    sharp_a = _measure_normals(rings, 0, n_a, m_a, X[a, 0], X[a, 1], X[a, 2])
-    sharp_b = _measure_normals(rings, 1, n_b, m_b, X[b, 0], X[b, 1], X[b, 2])
+    sharp_a, sharp_b = _measure_normals(mesh, a, b, rings)
     if kind == INNER and (sharp_a != sharp_b or limits.quadric_reach > 0.0):
         x, y, z, s = _meeting_point(mesh, a, b, sharp_a, sharp_b)
         if sharp_a == sharp_b:
-            x, y, z = _quadric_point(mesh, x, y, z, limits.quadric_reach * s, rings, n_a, n_b)
-        if overshoots(rings, 0, m_a, x, y, z, s, b, half) or overshoots(
-            rings, 1, m_b, x, y, z, s, a, half
-        ):
+            x, y, z = _quadric_point(mesh, x, y, z, limits.quadric_reach * s, rings)
+        if overshoots(rings, x, y, z, s, a, b, half):
             return KEPT_OVERSHOOT, 0.0, 0.0, 0.0, 0.0, 0, 0
     outcome = COLLAPSED
-    cosine = limits.foldover_cosine
-    if folds_over(mesh, x, y, z, kind, b, rings, 0, n_a, m_a, cosine) or folds_over(
-        mesh, x, y, z, kind, a, rings, 1, n_b, m_b, cosine
-    ):
+    if folds_over(mesh, x, y, z, kind, a, b, rings, limits.foldover_cosine):
         outcome = KEPT_FOLDOVER
     elif limits.sliver_check and makes_sliver(mesh, x, y, z, a, b, rings.face, n_a, n_b):
         outcome = KEPT_SLIVER
@@ -218,83 +210,100 @@ def examine_edge(mesh, h, low, high, limits, rings):
 
 @inlined
 def _overshoots_ahead(mesh, h, x, y, z, s, low, high, half_factor):
-    """Guard of `_survey_ring` for the third ring vertex from ``h``, opposite its end in most rings."""
-    for _ in range(3):
-        if h == NONE:
-            return False
-        h = np.int64(mesh.twin[previous(h)])
-    if h == NONE:
-        return False
-    w = mesh.origin[following(h)]
-    if w < low or w >= high:
-        return False
+    """Guard of `_survey_rings` for the third vertex of both rings, straight ahead in most of them."""
     X = mesh.X
-    dx, dy, dz = X[w, 0] - x, X[w, 1] - y, X[w, 2] - z
-    limit = half_factor * (s + X[w, 3])
-    return dx * dx + dy * dy + dz * dz > limit * limit
+    for side in range(2):
+        g = np.int64(mesh.twin[h]) if side else h
+        for _ in range(3):
+            if g != NONE:
+                g = np.int64(mesh.twin[previous(g)])
+        if g == NONE:
+            continue
+        w = mesh.origin[following(g)]
+        if w < low or w >= high:
+            continue
+        dx, dy, dz = X[w, 0] - x, X[w, 1] - y, X[w, 2] - z
+        limit = half_factor * (s + X[w, 3])
+        if dx * dx + dy * dy + dz * dz > limit * limit:
+            return True
+    return False
 
 
 @inlined
-def _survey_ring(mesh, v, other, x, y, z, s, low, high, half_factor, slack, rings, side):
-    """List outgoing half-edges and ring vertices of ``v``, with their coordinates.
+def _survey_rings(mesh, a, b, x, y, z, s, low, high, half_factor, slack, rings):
+    """List outgoing half-edges and ring vertices of both ends, with their coordinates.
 
-    Returns both counts; instead of the first minus the outcome where a ring vertex lies outside the
-    range, where there are too many, or where an edge from (x, y, z) to the ring would be too long for
-    the length ``s`` there (edges to inner vertices may be longer by ``slack``). Only faces at ``v`` are
-    read, which no other block can change.
+    Returns an outcome other than ``COLLAPSED`` where a ring vertex lies outside the range, where there
+    are too many, or where an edge from (x, y, z) to a ring would be too long for the length ``s`` there
+    (edges to inner vertices may be longer by ``slack``). Only faces at the ends are read, which no other
+    block can change.
     """
     X = mesh.X
-    start = np.int64(mesh.vertex_halfedge[v])
-    h = start
-    for i in range(RING_CAPACITY - 1):
-        at_end = h == NONE
-        if at_end:  # the last vertex around a boundary vertex starts no face at it
-            w = np.int64(mesh.origin[previous(rings.face[side, i - 1])])
-        else:
-            rings.face[side, i] = h
-            w = np.int64(mesh.origin[following(h)])
-        if w < low or w >= high:
-            return -OUTSIDE, 0
-        px, py, pz = X[w, 0], X[w, 1], X[w, 2]
-        dx, dy, dz = px - x, py - y, pz - z
-        limit = half_factor * (s + X[w, 3])
-        if slack != 1.0 and mesh.kind[w] == INNER:
-            limit *= slack
-        if w != other and dx * dx + dy * dy + dz * dz > limit * limit:
-            return -KEPT_OVERSHOOT, 0
-        rings.vertex[side, i] = w
-        rings.point[side, i, 0], rings.point[side, i, 1] = px, py
-        rings.point[side, i, 2], rings.point[side, i, 3] = pz, X[w, 3]
-        if at_end:
-            return i, i + 1
-        h = np.int64(mesh.twin[previous(h)])
-        if h == start:
-            return i + 1, i + 1
-    return -KEPT_LINK, 0
+    for side in range(2):
+        v, other = (b, a) if side else (a, b)
+        start = np.int64(mesh.vertex_halfedge[v])
+        h = start
+        i = 0
+        while True:
+            at_end = h == NONE
+            if at_end:  # the last vertex around a boundary vertex starts no face at it
+                w = np.int64(mesh.origin[previous(rings.face[side, i - 1])])
+            else:
+                rings.face[side, i] = h
+                w = np.int64(mesh.origin[following(h)])
+            if w < low or w >= high:
+                return OUTSIDE
+            px, py, pz, length = X[w, 0], X[w, 1], X[w, 2], X[w, 3]
+            dx, dy, dz = px - x, py - y, pz - z
+            limit = half_factor * (s + length)
+            if slack != 1.0 and mesh.kind[w] == INNER:
+                limit *= slack
+            if w != other and dx * dx + dy * dy + dz * dz > limit * limit:
+                return KEPT_OVERSHOOT
+            rings.vertex[side, i] = w
+            rings.point[side, i, 0], rings.point[side, i, 1] = px, py
+            rings.point[side, i, 2], rings.point[side, i, 3] = pz, length
+            i += 1
+            if at_end:
+                break
+            h = np.int64(mesh.twin[previous(h)])
+            if h == start:
+                break
+            if i == RING_CAPACITY - 1:
+                return KEPT_LINK
+        rings.size[side, 0] = i - 1 if at_end else i
+        rings.size[side, 1] = i
+    return COLLAPSED
 
 
 @inlined
-def _measure_normals(rings, side, n, m, x, y, z):
-    """Area vectors of the faces around (x, y, z) and their lengths; tells whether the vertex is sharp.
+def _measure_normals(mesh, a, b, rings):
+    """Area vectors of the faces around both ends and their lengths; tells which ends are sharp.
 
     Sharp: the normals cancel, as on the rim of a sheet.
     """
-    sx = sy = sz = total = 0.0
     point = rings.point
-    ux, uy, uz = point[side, 0, 0] - x, point[side, 0, 1] - y, point[side, 0, 2] - z
-    for i in range(n):
-        j = i + 1 if i + 1 < m else 0
-        wx, wy, wz = point[side, j, 0] - x, point[side, j, 1] - y, point[side, j, 2] - z
-        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-        length = sqrt(nx * nx + ny * ny + nz * nz)
-        rings.normal[side, i, 0], rings.normal[side, i, 1] = nx, ny
-        rings.normal[side, i, 2], rings.normal[side, i, 3] = nz, length
-        sx += nx
-        sy += ny
-        sz += nz
-        total += length
-        ux, uy, uz = wx, wy, wz
-    return sx * sx + sy * sy + sz * sz < SHARP * SHARP * total * total
+    is_sharp_a = is_sharp = False
+    for side in range(2):
+        is_sharp_a = is_sharp
+        v = b if side else a
+        x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
+        sx = sy = sz = total = 0.0
+        ux, uy, uz = point[side, 0, 0] - x, point[side, 0, 1] - y, point[side, 0, 2] - z
+        for i in range(rings.size[side, 0]):
+            j = i + 1 if i + 1 < rings.size[side, 1] else 0
+            wx, wy, wz = point[side, j, 0] - x, point[side, j, 1] - y, point[side, j, 2] - z
+            nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+            length = sqrt(nx * nx + ny * ny + nz * nz)
+            rings.normal[side, i, 0], rings.normal[side, i, 1] = nx, ny
+            rings.normal[side, i, 2], rings.normal[side, i, 3] = nz, length
+            sx += nx
+            sy += ny
+            sz += nz
+            total += length
+            ux, uy, uz = wx, wy, wz
+        is_sharp = sx * sx + sy * sy + sz * sz < SHARP * SHARP * total * total
+    return is_sharp_a, is_sharp
 
 
 @inlined
@@ -317,7 +326,7 @@ def _meeting_point(mesh, a, b, sharp_a, sharp_b):
 
 
 @inlined
-def _quadric_point(mesh, x, y, z, reach, rings, n_a, n_b):
+def _quadric_point(mesh, x, y, z, reach, rings):
     """Point closest to the planes of both rings, weighted by area [Garland and Heckbert 1997]."""
     xx = xy = xz = yy = yz = zz = gx = gy = gz = weight = 0.0
     X = mesh.X
@@ -325,7 +334,7 @@ def _quadric_point(mesh, x, y, z, reach, rings, n_a, n_b):
         # All planes of a ring pass through its centre.
         v = mesh.origin[rings.face[side, 0]]
         dx, dy, dz = x - X[v, 0], y - X[v, 1], z - X[v, 2]
-        for i in range(n_a if side == 0 else n_b):
+        for i in range(rings.size[side, 0]):
             norm = rings.normal[side, i, 3]
             if norm == 0.0:
                 continue

@@ -43,36 +43,40 @@ def joins_curves(mesh, h):
 
 
 @inlined
-def keeps_link(mesh, h, ring, n_a, m_a, n_b, m_b):
+def keeps_link(mesh, h, rings):
     """Guard: the link condition, link(a) and link(b) meet in link(ab) only.
 
     [Dey et al. 1999]: the common neighbours are the apexes of the edge's faces, and a tetrahedron,
     whose links share an edge too, stays.
     """
+    size = rings.size
     common = 0
-    for i in range(m_a):
-        for j in range(m_b):
-            common += ring[0, i] == ring[1, j]
+    for i in range(size[0, 1]):
+        for j in range(size[1, 1]):
+            common += rings.vertex[0, i] == rings.vertex[1, j]
     if mesh.twin[h] == NONE:
         return common == 1
-    return common == 2 and not (n_a == 3 and m_a == 3 and n_b == 3 and m_b == 3)
+    is_tetrahedron = size[0, 0] == 3 and size[0, 1] == 3 and size[1, 0] == 3 and size[1, 1] == 3
+    return common == 2 and not is_tetrahedron
 
 
 @inlined
-def overshoots(rings, side, m, x, y, z, s, other, half_factor):
-    """Guard: an edge from the new position to the ring would be too long for the length ``s`` there."""
-    for i in range(m):
-        dx = rings.point[side, i, 0] - x
-        dy = rings.point[side, i, 1] - y
-        dz = rings.point[side, i, 2] - z
-        limit = half_factor * (s + rings.point[side, i, 3])
-        if rings.vertex[side, i] != other and dx * dx + dy * dy + dz * dz > limit * limit:
-            return True
+def overshoots(rings, x, y, z, s, a, b, half_factor):
+    """Guard: an edge from the new position to a ring would be too long for the length ``s`` there."""
+    for side in range(2):
+        other = a if side else b
+        for i in range(rings.size[side, 1]):
+            dx = rings.point[side, i, 0] - x
+            dy = rings.point[side, i, 1] - y
+            dz = rings.point[side, i, 2] - z
+            limit = half_factor * (s + rings.point[side, i, 3])
+            if rings.vertex[side, i] != other and dx * dx + dy * dy + dz * dz > limit * limit:
+                return True
     return False
 
 
 @inlined
-def folds_over(mesh, x, y, z, kind, other, rings, side, n, m, cosine):
+def folds_over(mesh, x, y, z, kind, a, b, rings, cosine):
     """Guard: a face that stays would turn its normal too far, or lose its area.
 
     ``kind`` is that of the vertex that stays. On a curve, faces whose corners all lie on curves may
@@ -80,33 +84,32 @@ def folds_over(mesh, x, y, z, kind, other, rings, side, n, m, cosine):
     """
     point = rings.point
     normal = rings.normal
-    for i in range(n):
-        j = i + 1 if i + 1 < m else 0
-        v = rings.vertex[side, i]
-        w = rings.vertex[side, j]
-        if v == other or w == other:
-            continue
-        nx, ny, nz = face_vector(
-            x, y, z,
-            point[side, i, 0], point[side, i, 1], point[side, i, 2],
-            point[side, j, 0], point[side, j, 1], point[side, j, 2],
-        )  # fmt: skip
-        if normal[side, i, 3] == 0.0:
-            if nx == 0.0 and ny == 0.0 and nz == 0.0:
+    for side in range(2):
+        other = a if side else b
+        for i in range(rings.size[side, 0]):
+            j = i + 1 if i + 1 < rings.size[side, 1] else 0
+            v = rings.vertex[side, i]
+            w = rings.vertex[side, j]
+            if v == other or w == other:
+                continue
+            vx, vy, vz = point[side, i, 0], point[side, i, 1], point[side, i, 2]
+            wx, wy, wz = point[side, j, 0], point[side, j, 1], point[side, j, 2]
+            nx, ny, nz = face_vector(x, y, z, vx, vy, vz, wx, wy, wz)
+            if normal[side, i, 3] == 0.0:
+                if nx == 0.0 and ny == 0.0 and nz == 0.0:
+                    return True
+            elif turn_exceeds(
+                normal[side, i, 0], normal[side, i, 1], normal[side, i, 2], nx, ny, nz, cosine
+            ):
                 return True
-        elif turn_exceeds(
-            normal[side, i, 0], normal[side, i, 1], normal[side, i, 2], nx, ny, nz, cosine
-        ):
-            return True
-        if kind >= CURVE and mesh.kind[v] >= CURVE and mesh.kind[w] >= CURVE:
-            X = mesh.X
-            longest = max(
-                distance_squared(X, v, w),
-                (X[v, 0] - x) ** 2 + (X[v, 1] - y) ** 2 + (X[v, 2] - z) ** 2,
-                (X[w, 0] - x) ** 2 + (X[w, 1] - y) ** 2 + (X[w, 2] - z) ** 2,
-            )
-            if is_flat(nx, ny, nz, longest):
-                return True
+            if kind >= CURVE and mesh.kind[v] >= CURVE and mesh.kind[w] >= CURVE:
+                longest = max(
+                    (wx - vx) ** 2 + (wy - vy) ** 2 + (wz - vz) ** 2,
+                    (vx - x) ** 2 + (vy - y) ** 2 + (vz - z) ** 2,
+                    (wx - x) ** 2 + (wy - y) ** 2 + (wz - z) ** 2,
+                )
+                if is_flat(nx, ny, nz, longest):
+                    return True
     return False
 
 
