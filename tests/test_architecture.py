@@ -24,7 +24,7 @@ LEVELS = {
         "operations", "operations.split", "operations.collapse", "operations.flip",
         "operations.relax", "operations.project", "operations.slide", "operations.unfold",
         "operations.untangle", "operations.fit", "operations.guards", "operations.siblings",
-        "operations.bisect", "operations.measure",
+        "operations.bisect", "operations.measure", "operations.rings", "operations.templates",
     ],
     5: [
         "options", "constraints", "prepare", "lengths", "reference", "seams", "deviation",
@@ -40,7 +40,9 @@ SIDEWAYS = {
     ("creases", "_chains"), ("creases", "_echo"), ("sizing", "curvature"), ("sizing", "gradation"),
     ("operations.collapse", "operations.guards"), ("operations.siblings", "operations.collapse"),
     ("operations.bisect", "operations.measure"), ("operations.collapse", "operations.measure"),
+    ("operations.collapse", "operations.rings"), ("operations.siblings", "operations.rings"),
     ("operations.split", "operations.bisect"), ("operations.split", "operations.measure"),
+    ("operations.split", "operations.templates"),
     ("operations.slide", "operations.project"),
     ("lengths", "constraints"), ("lengths", "prepare"),
     ("reference", "constraints"), ("seams", "reference"), ("deviation", "reference"),

@@ -11,7 +11,8 @@ import numpy as np
 from .._jit import inlined, kernel
 from .._types import DEAD, FIXED, NONE, IndexArray, Mesh
 from ..halfedge import following, previous
-from .collapse import COLLAPSED, CollapseLimits, examine_edge, make_rings, remove_edge
+from .collapse import CollapseLimits, examine_edge, remove_edge
+from .rings import COLLAPSED, make_rings
 
 __all__ = ["collapse_siblings"]
 

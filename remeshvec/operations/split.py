@@ -17,6 +17,7 @@ from ..edge_sets import per_block
 from ..geometry import distance_squared
 from .bisect import birth_between, bisect_edges
 from .measure import REMOVED, EdgeFlags, measure_edges
+from .templates import CORNER, COUNT, GAIN, PART, TWIN
 
 __all__ = ["MAX_ROUNDS", "ROOM", "compact", "split_edges", "split_long_edges"]
 
@@ -28,57 +29,6 @@ _FEW = 1.0 / 16.0
 
 # Faces and vertices that a new mesh has room for, as a share of its faces: two for every split.
 ROOM = 2.0 * _FEW
-
-# Child triangles of a face by its mask of long edges (bit i: edge i from corner i to i + 1); with
-# two long edges bit 3 chooses the diagonal. Entries 0-2 are corners, 3-5 midpoints of edges 0-2.
-_CHILDREN: dict[int, list[tuple[int, int, int]]] = {
-    0: [(0, 1, 2)],
-    1: [(0, 3, 2), (3, 1, 2)],
-    2: [(1, 4, 0), (4, 2, 0)],
-    4: [(2, 5, 1), (5, 0, 1)],
-    7: [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)],
-    # edges 0 and 1 long: corner 1 is cut off, the quad 0-3-4-2 is halved by 3-2 or by 0-4.
-    3: [(3, 1, 4), (0, 3, 2), (3, 4, 2)],
-    3 + 8: [(3, 1, 4), (0, 3, 4), (0, 4, 2)],
-    # edges 1 and 2 long: corner 2 is cut off, the quad 1-4-5-0 is halved by 4-0 or by 1-5.
-    6: [(4, 2, 5), (1, 4, 0), (4, 5, 0)],
-    6 + 8: [(4, 2, 5), (1, 4, 5), (1, 5, 0)],
-    # edges 2 and 0 long: corner 0 is cut off, the quad 2-5-3-1 is halved by 5-1 or by 2-3.
-    5: [(5, 0, 3), (2, 5, 1), (5, 3, 1)],
-    5 + 8: [(5, 0, 3), (2, 5, 3), (2, 3, 1)],
-}
-
-
-def _build_templates() -> tuple[np.ndarray, ...]:
-    """Turn the list of children into tables.
-
-    Counts, corners, twins inside, place of each half edge, faces that each corner gains.
-    """
-    count = np.zeros(16, np.int64)
-    corner = np.full((16, 12), -1, np.int64)
-    inner = np.full((16, 12), -1, np.int64)
-    part = np.full((16, 6), -1, np.int64)
-    for mask, children in _CHILDREN.items():
-        count[mask] = len(children)
-        flat = [v for child in children for v in child]
-        ends = {}
-        for i, v in enumerate(flat):
-            corner[mask, i] = v
-            ends[v, flat[i - i % 3 + (i + 1) % 3]] = i
-        for (a, b), i in ends.items():
-            inner[mask, i] = ends.get((b, a), -1)
-        for edge in range(3):
-            a, b, middle = edge, (edge + 1) % 3, 3 + edge
-            if (a, b) in ends:
-                part[mask, 2 * edge] = ends[a, b]
-            else:
-                part[mask, 2 * edge] = ends[a, middle]
-                part[mask, 2 * edge + 1] = ends[middle, b]
-    gain = np.stack([(corner == v).sum(axis=1) - (v < 3) for v in range(6)], axis=1)
-    return count, corner, inner, part, gain
-
-
-_COUNT, _CORNER, _INNER, _PART, _GAIN = _build_templates()
 
 
 def split_long_edges(
@@ -217,7 +167,7 @@ def _mark_edges(span, mesh, blocks, asked, splits, mask, sizes):
                     split += ((m >> i) & 1) & (t < h)
                 if m == 3 or m == 5 or m == 6:
                     m = _choose_diagonal(mesh, f, m)
-            children += _COUNT[m]
+            children += COUNT[m]
             for i in range(3):
                 h = 3 * f + i
                 is_owner = np.int64(mesh.vertex_halfedge[mesh.origin[h]] == h)
@@ -256,7 +206,7 @@ def _number(span, mesh, blocks, mask, ends, first_child, new_vertex, middle):
             if m == REMOVED:
                 continue
             first_child[f] = child
-            child += _COUNT[m & 15]
+            child += COUNT[m & 15]
             if m == 0:
                 continue
             for i in range(3):
@@ -287,7 +237,7 @@ def _write(
             owned = m >> 4
             m &= 15
             base = 3 * np.int64(first_child[f])
-            face = first_child[f] + _COUNT[m]
+            face = first_child[f] + COUNT[m]
             if m == 0:  # most faces: a copy
                 for i in range(3):
                     origin[base + i] = new_vertex[mesh.origin[3 * f + i]]
@@ -311,7 +261,7 @@ def _write(
                 if (owned >> i) & 1:
                     new = new_vertex[v]
                     vertex = np.int64(new) + 1
-                    halfedge[new] = base + (i if m == 0 else _PART[m, 2 * i])
+                    halfedge[new] = base + (i if m == 0 else PART[m, 2 * i])
                     excess[new] = mesh.valence_excess[v]
                     kind[new] = mesh.kind[v]
                     birth[new] = mesh.birth[v]
@@ -321,7 +271,7 @@ def _write(
                     new = middle[h]
                     vertex = np.int64(new) + 1
                     w = mesh.origin[3 * f + (i + 1) % 3]
-                    halfedge[new] = base + _PART[m, 2 * i + 1]
+                    halfedge[new] = base + PART[m, 2 * i + 1]
                     # No face yet: `_update_valences` adds them. A boundary has an edge more.
                     excess[new] = -6 if mesh.twin[h] != NONE else -3
                     kind[new] = INNER if mesh.curve[h] == NONE else CURVE
@@ -339,21 +289,21 @@ def _write(
 @inlined
 def _write_children(mesh, f, m, base, ids, mask, first_child, origin, twin, curve, source):
     """Write children and their twins: inside a template from its table, across by parts of edges."""
-    for j in range(_COUNT[m]):
+    for j in range(COUNT[m]):
         source[base // 3 + j] = mesh.source[f]
-    for j in range(3 * _COUNT[m]):
+    for j in range(3 * COUNT[m]):
         curve[base + j] = NONE
-        origin[base + j] = ids[_CORNER[m, j]]
-        twin[base + j] = base + _INNER[m, j] if _INNER[m, j] >= 0 else NONE
+        origin[base + j] = ids[CORNER[m, j]]
+        twin[base + j] = base + TWIN[m, j] if TWIN[m, j] >= 0 else NONE
     for i in range(3):
         # Halves meet crosswise: the first of this side lies on the second of the other.
         half = (m >> i) & 1
         t = mesh.twin[3 * f + i]
-        twin[base + _PART[m, 2 * i]] = _part_of(t, half, mask, first_child)
-        curve[base + _PART[m, 2 * i]] = mesh.curve[3 * f + i]
+        twin[base + PART[m, 2 * i]] = _part_of(t, half, mask, first_child)
+        curve[base + PART[m, 2 * i]] = mesh.curve[3 * f + i]
         if half:
-            twin[base + _PART[m, 2 * i + 1]] = _part_of(t, 0, mask, first_child)
-            curve[base + _PART[m, 2 * i + 1]] = mesh.curve[3 * f + i]
+            twin[base + PART[m, 2 * i + 1]] = _part_of(t, 0, mask, first_child)
+            curve[base + PART[m, 2 * i + 1]] = mesh.curve[3 * f + i]
 
 
 @inlined
@@ -364,62 +314,7 @@ def _part_of(h, half, mask, first_child):
     f = np.int64(h) // 3
     i = np.int64(h) - 3 * f
     m = np.int64(mask[f]) & 15
-    return 3 * np.int64(first_child[f]) + (i if m == 0 else _PART[m, 2 * i + half])
-
-
-@threaded(per_block)
-def _write_vertices(
-    span,
-    mesh,
-    blocks,
-    ends,
-    mask,
-    first_child,
-    new_vertex,
-    middle,
-    halfedge,
-    excess,
-    X,
-    kind,
-    birth,
-):
-    """Copy the vertices and put midpoints between them, each from the half-edge that owns it."""
-    for k in range(span[0], span[1]):
-        end = ends[k, 1]
-        for f in range(blocks.face[k], blocks.face[k + 1]):
-            m = np.int64(mask[f])
-            if m == REMOVED:
-                continue
-            base = 3 * np.int64(first_child[f])
-            for i in range(3):
-                h = 3 * f + i
-                v = mesh.origin[h]
-                if mesh.vertex_halfedge[v] == h:
-                    new = new_vertex[v]
-                    end = new + 1
-                    halfedge[new] = base + _PART[m, 2 * i]
-                    excess[new] = mesh.valence_excess[v]
-                    kind[new] = mesh.kind[v]
-                    birth[new] = mesh.birth[v]
-                    for j in range(4):
-                        X[new, j] = mesh.X[v, j]
-                if (m >> i) & 1 and mesh.twin[h] < h:
-                    new = middle[h]
-                    end = new + 1
-                    w = mesh.origin[3 * f + (i + 1) % 3]
-                    inner = mesh.twin[h] != NONE
-                    halfedge[new] = base + _PART[m, 2 * i + 1]
-                    # No face yet: `_update_valences` adds them. A boundary has an edge more.
-                    excess[new] = -6 if inner else -3
-                    kind[new] = INNER if mesh.curve[h] == NONE else CURVE
-                    birth[new] = birth_between(mesh, h, v, w)
-                    for j in range(4):
-                        X[new, j] = 0.5 * (mesh.X[v, j] + mesh.X[w, j])
-        for v in range(end, ends[k + 1, 1]):
-            halfedge[v] = DEAD
-            kind[v] = INNER
-            birth[v] = 0
-            X[v] = 1.0
+    return 3 * np.int64(first_child[f]) + (i if m == 0 else PART[m, 2 * i + half])
 
 
 @threaded(per_block)
@@ -457,6 +352,6 @@ def _update_valences_across(mesh, blocks, mask, new_vertex, middle, excess, acro
 def _add_gains(mesh, f, m, new_vertex, middle, excess):
     for i in range(3):
         h = 3 * f + i
-        excess[new_vertex[mesh.origin[h]]] += _GAIN[m, i]
+        excess[new_vertex[mesh.origin[h]]] += GAIN[m, i]
         if (m >> i) & 1:
-            excess[middle[max(h, np.int64(mesh.twin[h]))]] += _GAIN[m, 3 + i]
+            excess[middle[max(h, np.int64(mesh.twin[h]))]] += GAIN[m, 3 + i]
