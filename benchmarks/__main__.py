@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import subprocess
 import sys
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
@@ -40,16 +42,19 @@ for options in RECIPES.values():
 def main(argv: Sequence[str] | None = None) -> int:
     """Run what is asked for."""
     arguments = _parse(argv)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # clears workers and files away
     folder = arguments.output or (QUICK_FOLDER if arguments.quick else DOCS)
     if arguments.merge:
         merge(folder, json.loads(arguments.merge.read_text(encoding="utf-8")))
-    elif not arguments.pages:
-        _measure(arguments, folder)
+    failed = [] if arguments.merge or arguments.pages else _measure(arguments, folder)
     write_pages(folder)
-    return 0
+    if failed:
+        print(f"failed: {', '.join(failed)}", file=sys.stderr)
+    return 1 if failed else 0
 
 
-def _measure(arguments: argparse.Namespace, folder: Path) -> None:
+def _measure(arguments: argparse.Namespace, folder: Path) -> list[str]:
+    """Run the parts; returns those that failed, which do not stop the others."""
     for package in sorted({c.package for c in CONTENDERS.values() if not c.is_installed}):
         print(f"{package} is not installed and left out", file=sys.stderr)
     subprocess.run([sys.executable, "-c", COMPILE], cwd=ROOT, check=False)
@@ -65,14 +70,20 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> None:
         arguments.missing,
         arguments.quick,
     )
+    failed = []
     for name in _wanted(arguments.parts):
         if monotonic() > deadline:
             print(f"no time left for {name}", file=sys.stderr)
             continue
         started = monotonic()
-        run_part(name, run)
+        try:
+            run_part(name, run)
+        except Exception:
+            traceback.print_exc()
+            failed.append(name)
         print(f"{name}: {monotonic() - started:.0f} s", file=sys.stderr)
         write_pages(folder)
+    return failed
 
 
 def _wanted(names: Sequence[str]) -> list[str]:

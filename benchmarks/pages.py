@@ -49,6 +49,36 @@ INTRO = (
     "`@0.5`: L = 0.5 x the mean edge."
 )
 
+HOW = """## How to measure
+
+```sh
+pip install -e '.[peers]'            # every library is optional; absent ones are named above
+export REMESHVEC_PMP=~/pmp/remesh    # optional, too
+python -m benchmarks                 # all parts, the most important first
+python -m benchmarks targets         # those that the table of targets needs
+python -m benchmarks large threads   # some; --help lists them and what they take
+python -m benchmarks --missing       # go on with a run that was stopped
+python -m benchmarks --quick         # does everything run? Small meshes, into build/benchmarks
+python -m benchmarks --merge FILE    # take over the benchmarks.json of another machine
+pytest benchmarks                    # phases, calls and starts one at a time; -m slow from 1M faces
+```
+
+All results are in `benchmarks.json`, each with its date and machine, and are written after every mesh.
+What fails, crashes or takes too long costs its own row only.
+
+The executable for the PMP library gets `INPUT OUTPUT LENGTH ITERATIONS PROJECT` (OFF files, PROJECT 0
+or 1) and prints the seconds of the remeshing alone. Built with `-O3 -march=native`, its heart is:
+
+```cpp
+pmp::SurfaceMesh mesh;
+pmp::read(mesh, argv[1]);
+const auto start = std::chrono::steady_clock::now();
+pmp::uniform_remeshing(mesh, std::atof(argv[3]), std::atoi(argv[4]), std::atoi(argv[5]) != 0);
+const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+pmp::write(mesh, argv[2]);
+std::printf("%.6f\\n", seconds.count());
+```"""
+
 
 def write_pages(folder: Path) -> None:
     """Write all pages and plots for which there are results."""
@@ -90,6 +120,7 @@ def _benchmarks(results: Results, pictures: set[str]) -> str:
         *(_mesh(entry) for entry in (*compared, *races["large"].values())),
         "## Settings",
         _settings(),
+        HOW,
         "## Measured on",
         *_dates(results),
     )

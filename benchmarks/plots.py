@@ -84,9 +84,16 @@ def _against_faces(axes: Any, lines: dict[str, list[tuple[int, float]]], title: 
         faces, values = zip(*lines[name], strict=True)
         axes.plot(faces, values, label=name, **styles[name])
     axes.set(xscale="log", yscale="log", xlabel="faces of the input", title=title)
-    axes.grid(which="major", alpha=0.3)
+    axes.xaxis.set_major_formatter(lambda faces, _: _short(faces))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.grid(which="both", alpha=0.2)
     _legend_beside(axes)
     return bool(lines)
+
+
+def _short(count: float) -> str:
+    """Write 10,000 as 10k, and a million as 1M."""
+    return f"{count / 1e6:g}M" if count >= 1e6 else f"{count / 1e3:g}k"
 
 
 def _styles(names: Any) -> dict[str, dict[str, Any]]:

@@ -65,7 +65,7 @@ def run_child(file: Path, cache: Path | None = None) -> Child:
 
     Raises
     ------
-    SystemExit
+    RuntimeError
         The process failed.
     """
     done = subprocess.run(
@@ -77,7 +77,7 @@ def run_child(file: Path, cache: Path | None = None) -> Child:
         check=False,
     )
     if done.returncode:
-        raise SystemExit(f"the fresh process failed:\n{done.stderr}")
+        raise RuntimeError(f"the fresh process failed:\n{done.stderr}")
     return {**json.loads(done.stdout), "notices": done.stderr.splitlines()}
 
 
