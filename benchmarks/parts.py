@@ -116,17 +116,17 @@ def _on_these_cores(mesh: str) -> str:
 
 
 RACES = {
-    "samples": Part("the meshes of the report, all contenders on one core", 4, True, _samples),
+    "samples": Part("the meshes of the report, all contenders on one core", 5, True, _samples),
     "large": Part(
         "640,000 faces: finer, as it is, coarser",
-        9,
+        8,
         True,
         _large,
         Effort(limit=120.0, budget=150.0),
     ),
     "threads": Part(
         "640,000 and 2.6 million faces on one thread and more",
-        6,
+        4,
         True,
         _threads,
         Effort(limit=300.0, budget=150.0, has_quality=False),
@@ -134,7 +134,7 @@ RACES = {
     ),
     "per-face": Part(
         "cost of a face at 4 million over that at 360,000",
-        5,
+        3,
         True,
         _per_face,
         Effort(limit=300.0, budget=150.0, has_quality=False),
@@ -146,7 +146,7 @@ RACES = {
         _memory,
         Effort(repeat=0, limit=600.0, has_quality=False),
     ),
-    "data": Part("the meshes in data/, all contenders on one core", 4, False, _data),
+    "data": Part("the meshes in data/, all contenders on one core", 5, False, _data),
     "sizes": Part(
         "time and memory against faces, all contenders",
         20,
@@ -168,7 +168,7 @@ class Other(NamedTuple):
 
 
 OTHERS = {
-    "start": Other("import, first call, compilation, in fresh processes", 4, True, start.run),
+    "start": Other("import, first call, compilation, in fresh processes", 3, True, start.run),
     "phases": Other("time by phase", 1, False, phases.run),
 }
 
