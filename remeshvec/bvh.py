@@ -8,16 +8,19 @@ than the search of the whole tree, which takes some tenths of a microsecond even
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numba import prange
 
-from ._jit import driver, inlined
+from ._jit import driver, inlined, kernel
 from ._types import NONE, FloatArray, IndexArray, Tree
 from .geometry import closest_on_triangle, face_vector
 from .halfedge import following, previous
 
 __all__ = [
     "STACK",
+    "Surface",
     "build_tree",
     "closest_face",
     "closest_faces",
@@ -32,6 +35,60 @@ _WALK = 64  # steps of a walk
 _FAN = 32  # faces around a corner that one step looks at
 _POINTS = 256  # points that follow each other in one query
 STACK = 64  # boxes waiting: 3 a level and 16 levels hold 4e9 leaves
+
+
+class Surface:
+    """A surface whose patches and tree are found when they are first asked for.
+
+    Sweeps that do not project need neither.
+
+    Parameters
+    ----------
+    X : (n, 3) or (n, 4) float64
+    origin : (3 m,) int32
+        Corners of the faces, which come in Morton order.
+    twin : (3 m,) int32
+        Opposite half-edges, ``NONE`` where a patch ends.
+    parallel : bool
+        Whether the parallel kernels may run; may be set anew before the tree is asked for.
+    """
+
+    def __init__(self, X: FloatArray, origin: IndexArray, twin: IndexArray, parallel: bool) -> None:
+        self.X = X
+        self.origin = origin
+        self.twin = twin
+        self.parallel = parallel
+
+    @cached_property
+    def tree(self) -> Tree:
+        """The tree; coordinates must not have changed."""
+        F = self.origin.reshape(-1, 3)
+        patch = np.full(len(F), NONE, np.int32)
+        _fill_patches(self.twin, patch)
+        return build_tree(self.X, F, self.twin, patch, self.parallel)
+
+
+@kernel
+def _fill_patches(twin, patch):
+    """Give a number to each set of faces that hang together."""
+    stack = np.empty(patch.size, np.int32)
+    count = 0
+    for seed in range(patch.size):
+        if patch[seed] != NONE:
+            continue
+        patch[seed] = count
+        stack[0] = seed
+        size = 1
+        while size > 0:
+            size -= 1
+            f = np.int64(stack[size])
+            for h in range(3 * f, 3 * f + 3):
+                t = twin[h]
+                if t != NONE and patch[t // 3] == NONE:
+                    patch[t // 3] = count
+                    stack[size] = t // 3
+                    size += 1
+        count += 1
 
 
 def build_tree(

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jit import kernel
 from ._types import CURVE, FIXED, FROZEN, HELD, INNER, NONE, SEAM, IndexArray, Mesh
-from .bvh import build_tree
+from .bvh import Surface
 from .constraints import Marks
 from .corners import find_corners
 from .creases import find_creases
@@ -81,12 +80,11 @@ def build_reference(
     _mark(mesh, origin, is_feature, marks.frozen, name, members, fixed)
     mesh.kind[apexes(mesh)] = HELD
     is_wall = is_feature if marks.held is None else is_feature | _walls(twin, marks.held)
-    inside = np.where(is_wall, NONE, twin).astype(np.int32)
-    patch = np.full(len(origin) // 3, NONE, np.int32)
-    _fill_patches(inside, patch)
-    tree = build_tree(mesh.X, origin.reshape(-1, 3), inside, patch, parallel)
     arcs = measure_arcs(mesh.X, origin, name, beside)
-    reference = Reference(tree, mesh.X.copy(), origin, beside, arcs)
+    X = mesh.X.copy()
+    twin[is_wall] = NONE
+    surface = Surface(X, origin, twin, parallel)
+    reference = Reference(surface, X, origin, beside, arcs)
     _lengthen_beside(mesh, vertex_source, marks.frozen)
     keys = _edge_keys(origin, is_feature, len(fixed))
     return Built(reference, on_seam, marks.held, keys, counts)
@@ -185,26 +183,3 @@ def _mark(
     np.minimum.at(smallest, ends, np.concatenate([name[edges], name[edges]]))
     on_curve = mesh.kind == CURVE
     mesh.birth[on_curve] = smallest[on_curve]
-
-
-@kernel
-def _fill_patches(twin, patch):
-    """Give a number to each set of faces that hang together."""
-    stack = np.empty(patch.size, np.int32)
-    count = 0
-    for seed in range(patch.size):
-        if patch[seed] != NONE:
-            continue
-        patch[seed] = count
-        stack[0] = seed
-        size = 1
-        while size > 0:
-            size -= 1
-            f = np.int64(stack[size])
-            for h in range(3 * f, 3 * f + 3):
-                t = twin[h]
-                if t != NONE and patch[t // 3] == NONE:
-                    patch[t // 3] = count
-                    stack[size] = t // 3
-                    size += 1
-        count += 1

@@ -14,8 +14,9 @@ from ._check import as_mesh, positive_count
 from ._jit import compile_notice, thread_scope
 from ._types import FloatArray, Mesh
 from .constraints import Constraints, make_constraints
+from .edge_sets import make_blocks
 from .errors import OptionError
-from .extract import extract
+from .extract import extract, locate
 from .lengths import (
     Measures,
     adaptive_limits,
@@ -27,7 +28,7 @@ from .lengths import (
 from .options import make_options
 from .prepare import Prepared, prepare
 from .reference import Built, build_reference
-from .report import RemeshResult, Report, Stopwatch
+from .report import Late, RemeshResult, Report, Stopwatch
 from .sizing import Adaptive
 from .sweeps import Callback, Sweeps
 
@@ -212,19 +213,37 @@ def remesh(
             sweeps.limit_lengths = lambda x: limited_lengths(prepared, x, sizing.gradation)
         job = _Job(prepared, measure(prepared), constraints, vertices, sizing, sweeps)
         done = job.run() if count is None else _meet_count(job, *count)
+        parallel = sweeps.is_parallel(len(done.mesh.origin) // 3)
+        barycentric = None
+        if options.project or options.fit_rounds:
+            with watch.time("locate"):
+                barycentric = locate(
+                    done.mesh,
+                    make_blocks(done.mesh),
+                    done.built.reference,
+                    not options.fit_rounds,
+                    parallel,
+                )
     with watch.time("extract"):
         out = extract(
-            done.mesh, done.barycentric, prepared, done.built, constraints, vertices, len(faces)
+            done.mesh,
+            barycentric,
+            prepared,
+            done.built,
+            constraints,
+            vertices,
+            len(faces),
+            options.threads if parallel else 1,
         )
-        V2 = out.V.astype(_vertex_dtype(V))
+        V2 = out.V.astype(_vertex_dtype(V), copy=False)
         F2 = out.F.astype(_face_dtype(F, len(V2)))
     report = Report(
         done.length, options, sweeps.counts, watch.stop(), sweeps.stop, prepared.dirt,
         done.built.counts, sweeps.deviation, before=(V, F), after=(V2, F2),
     )  # fmt: skip
     return RemeshResult(
-        V2, F2, out.birth_face, out.birth_barycentric, report, out.face_labels, out.vertex_map,
-        out.face_map, out.feature_edges, out.corners, out.lengths,
+        V2, F2, report, out.face_labels, out.lengths, Late(out.births), Late(out.vertex_map),
+        Late(out.face_map), Late(out.feature_edges), Late(out.corners),
     )  # fmt: skip
 
 
@@ -242,7 +261,6 @@ class _Done:
     """A remeshed surface in the frame of `Prepared`."""
 
     mesh: Mesh
-    barycentric: FloatArray
     built: Built
     length: float  # of the mean new edge, in the units of the input
 
@@ -290,8 +308,8 @@ class _Job:
             parallel = self.sweeps.is_parallel(len(mesh.origin) // 3)
             built = build_reference(mesh, prepared.vertex_source, angle, marks, parallel)
         mesh = self.sweeps.run(mesh, built)
-        mesh, barycentric = self.sweeps.finish(mesh, built)
-        return _Done(mesh, barycentric, built, length / prepared.scale)
+        mesh = self.sweeps.finish(mesh, built)
+        return _Done(mesh, built, length / prepared.scale)
 
 
 def _wanted_count(L: Any, n_faces: Any, n_vertices: Any) -> tuple[str, int] | None:

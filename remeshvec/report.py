@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +15,37 @@ from numpy.typing import ArrayLike, NDArray
 from .options import Options
 from .quality import Quality, quality
 
-__all__ = ["RemeshResult", "Report", "Stopwatch"]
+__all__ = ["Late", "RemeshResult", "Report", "Stopwatch"]
+
+T = TypeVar("T")
+
+Births = tuple[NDArray[np.int64], NDArray[np.float64]]
+
+
+class Late(Generic[T]):
+    """A value that is made when it is first asked for: once, and at the latest for a pickle or a copy.
+
+    What ``make`` holds is let go of then.
+    """
+
+    def __init__(self, make: Callable[[], T]) -> None:
+        self._make: Callable[[], T] | None = make
+        self._lock = threading.Lock()
+
+    def __call__(self) -> T:
+        """Return the value."""
+        with self._lock:
+            if self._make is not None:
+                self._value = self._make()
+                self._make = None
+        return self._value
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _known, (self(),)
+
+
+def _known(value: T) -> Late[T]:
+    return Late(lambda: value)
 
 
 class _Lap:
@@ -125,44 +156,67 @@ class Report:
 class RemeshResult:
     """A remeshed surface; unpacks as ``V, F = result``.
 
+    What few callers read is computed when it is first asked for, or when the result is copied or
+    pickled. Until then births of vertices that were not projected hold the input's faces in memory.
+
     Attributes
     ----------
     V : (n, 3)
         Vertices, in the dtype of the input (float64 for integers).
     F : (m, 3)
         Faces, in the dtype of the input.
-    birth_face : (n,) int64
-        Input face on which each vertex lies.
-    birth_barycentric : (n, 3) float64
-        Where on it: ``V = sum(birth_barycentric[:, i] * V_in[F_in[birth_face, i]])`` for vertices
-        that lie on the input; otherwise that is the point of the input closest to the vertex, among
-        those that a walk over the input sees where it ends within 0.05 L.
     report : Report
     face_labels : (m,) int, or None
         Label of every face, where the input had labels.
-    vertex_map : (n_in,) int64
-        For every input vertex the output vertex that is the same, held bit for bit; -1 for none.
-    face_map : (m_in,) int64
-        For every input face that had to stay the output face; -1 for the others.
-    feature_edges : (k, 2) int64
-        Edges on creases, boundaries, borders of labels, and where sheets meet.
-    corners : (k,) int64
-        Vertices that did not move.
     lengths : (n,) float64
         Target edge length at every vertex.
     """
 
     V: NDArray[Any]
     F: NDArray[Any]
-    birth_face: NDArray[np.int64]
-    birth_barycentric: NDArray[np.float64]
     report: Report
     face_labels: NDArray[Any] | None
-    vertex_map: NDArray[np.int64]
-    face_map: NDArray[np.int64]
-    feature_edges: NDArray[np.int64]
-    corners: NDArray[np.int64]
     lengths: NDArray[np.float64]
+    _births: Late[Births] = field(repr=False, compare=False)
+    _vertex_map: Late[NDArray[np.int64]] = field(repr=False, compare=False)
+    _face_map: Late[NDArray[np.int64]] = field(repr=False, compare=False)
+    _feature_edges: Late[NDArray[np.int64]] = field(repr=False, compare=False)
+    _corners: Late[NDArray[np.int64]] = field(repr=False, compare=False)
 
     def __iter__(self) -> Iterator[NDArray[Any]]:
         return iter((self.V, self.F))
+
+    @property
+    def birth_face(self) -> NDArray[np.int64]:
+        """Input face on which each vertex lies, (n,)."""
+        return self._births()[0]
+
+    @property
+    def birth_barycentric(self) -> NDArray[np.float64]:
+        """Where on its birth face each vertex lies, (n, 3).
+
+        ``V = sum(birth_barycentric[:, i] * V_in[F_in[birth_face, i]])`` for vertices that lie on the
+        input; otherwise that is the point of the input closest to the vertex, among those that a walk
+        over the input sees where it ends within 0.05 L.
+        """
+        return self._births()[1]
+
+    @property
+    def vertex_map(self) -> NDArray[np.int64]:
+        """For every input vertex the output vertex that is the same, bit for bit; -1 for none."""
+        return self._vertex_map()
+
+    @property
+    def face_map(self) -> NDArray[np.int64]:
+        """For every input face that had to stay the output face; -1 for the others."""
+        return self._face_map()
+
+    @property
+    def feature_edges(self) -> NDArray[np.int64]:
+        """Edges on creases, boundaries, borders of labels, and where sheets meet, (k, 2)."""
+        return self._feature_edges()
+
+    @property
+    def corners(self) -> NDArray[np.int64]:
+        """Vertices that did not move, (k,)."""
+        return self._corners()

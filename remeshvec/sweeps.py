@@ -27,7 +27,7 @@ from .operations.collapse import CollapseLimits, collapse_short_edges
 from .operations.fit import fit_vertices
 from .operations.flip import FlipLimits, flip_edges
 from .operations.measure import EdgeFlags, measure_edges
-from .operations.project import locate_vertices, project_vertices, read_lengths
+from .operations.project import project_vertices, read_lengths
 from .operations.relax import relax_vertices
 from .operations.siblings import collapse_siblings
 from .operations.slide import slide_vertices
@@ -301,9 +301,8 @@ class Sweeps:
                 read_lengths(mesh, blocks, built.reference, parallel)
                 bound_gradation(mesh, self.gradation, copies_on_seams(mesh, built))
 
-    def finish(self, mesh: Mesh, built: Built) -> tuple[Mesh, FloatArray]:
-        """Untangle, fit, and find where on the input every vertex lies."""
-        options, reference = self.options, built.reference
+    def finish(self, mesh: Mesh, built: Built) -> Mesh:
+        """Project for the last time, untangle, fit; returns a compact mesh."""
         parallel = self.is_parallel(mesh.origin.size // 3)
         with self.watch.time("extract"):
             mesh = compact(mesh, make_blocks(mesh), parallel)
@@ -313,12 +312,11 @@ class Sweeps:
                 mesh = separate_sheets(mesh, built)
             blocks = make_blocks(mesh)
         with self.watch.time("finish"):
-            mesh, blocks, _ = self._guarded(
+            mesh, _, _ = self._guarded(
                 mesh, blocks, partial(self._polish, built=built, parallel=parallel)
             )
             if self.tolerance is not None:
                 mesh = self._refine(mesh, built, self.tolerance)
-                blocks = make_blocks(mesh)
             if np.ptp(mesh.X[:, 3]) > 0.0:
                 bound_gradation(mesh, self.gradation, copies_on_seams(mesh, built))
         guard = self.guard
@@ -328,25 +326,23 @@ class Sweeps:
             with self.watch.time("deviation"):
                 measured = guard.measure(mesh)
                 self.deviation = {way: d / self.scale for way, d in measured.items()}
-        with self.watch.time("locate"):
-            is_on_input = options.project and not options.fit_rounds
-            trust = np.inf if is_on_input else _TRUST * float(mesh.X[:, 3].mean())
-            barycentric = locate_vertices(mesh, blocks, reference, trust, parallel)
-        return mesh, barycentric
+        return mesh
 
     def _polish(self, mesh: Mesh, blocks: Blocks, built: Built, parallel: bool) -> _Changed:
         """Move vertices for the last time."""
-        options, tree = self.options, built.reference.tree
+        options, reference = self.options, built.reference
         if options.project:
             before = mesh.X.copy()
-            project_vertices(mesh, blocks, built.reference, _TRUST, parallel)
+            project_vertices(mesh, blocks, reference, _TRUST, parallel)
             undo_folds(mesh, blocks, before, parallel)
-        cosine = cos(radians(options.untangle_angle))
-        untangle_vertices(
-            mesh, blocks, tree, options.project, cosine, options.untangle_rounds, parallel
-        )
+        if options.untangle_rounds:
+            cosine = cos(radians(options.untangle_angle))
+            rounds = options.untangle_rounds
+            untangle_vertices(
+                mesh, blocks, reference.tree, options.project, cosine, rounds, parallel
+            )
         for _ in range(options.fit_rounds):
-            fit_vertices(mesh, blocks, tree, _FIT_REACH, parallel)
+            fit_vertices(mesh, blocks, reference.tree, _FIT_REACH, parallel)
         return _Changed(mesh, blocks, 0.0)
 
     def _refine(self, mesh: Mesh, built: Built, tolerance: float) -> Mesh:

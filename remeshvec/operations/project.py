@@ -25,7 +25,7 @@ from .._types import (
     Mesh,
     Tree,
 )
-from ..bvh import STACK, closest_face, point_on_face, search_face, walk_to_face
+from ..bvh import STACK, Surface, closest_face, point_on_face, search_face, walk_to_face
 from ..edge_sets import per_block
 from ..geometry import face_vector
 from ..halfedge import following, previous
@@ -43,11 +43,16 @@ __all__ = [
 class Reference(NamedTuple):
     """The input surface: what vertices are projected onto and born on."""
 
-    tree: Tree
+    surface: Surface  # gets its tree when it is first projected onto
     X: FloatArray  # (n, 4), target lengths in the last column
     origin: IndexArray  # (3 m,)
     beside: IndexArray  # (2, 3 m), see `polyline.join_edges`
     arcs: FloatArray  # (3, 3 m), see `polyline.measure_arcs`
+
+    @property
+    def tree(self) -> Tree:
+        """The tree over its faces, built when it is first asked for."""
+        return self.surface.tree
 
 
 def project_vertices(
@@ -85,7 +90,16 @@ def locate_vertices(
         the vertex.
     """
     barycentric = np.zeros((mesh.vertex_halfedge.size, 3))
-    _locate(parallel, mesh, blocks, *reference[:4], trust * trust, mesh.birth, barycentric)
+    _locate(
+        parallel,
+        mesh,
+        blocks,
+        reference.tree,
+        *reference[1:4],
+        trust * trust,
+        mesh.birth,
+        barycentric,
+    )
     return barycentric
 
 
