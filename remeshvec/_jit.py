@@ -279,13 +279,16 @@ class _Helpers:
         self.count = 0
         self.lock = threading.Lock()
 
-    def ask(self, job: Callable[[], None], count: int) -> None:
-        """Let up to ``count`` threads do a job."""
+    def ask(self, job: Callable[[], None], count: int, most: int) -> None:
+        """Let up to ``count`` threads do a job, of ``most`` that there should be when all are busy."""
         with self.lock:
-            while self.count < count:
-                threading.Thread(target=self._work, daemon=True, name="remeshvec").start()
+            while self.count < most:
+                try:
+                    threading.Thread(target=self._work, daemon=True, name="remeshvec").start()
+                except RuntimeError:  # no more threads to be had; the caller does the work
+                    break
                 self.count += 1
-        for _ in range(count):
+        for _ in range(min(count, self.count)):
             self.jobs.put(job)
 
     def _work(self) -> None:
@@ -305,8 +308,7 @@ class _Job:
         """Run pieces until none is left; returns how many."""
         taken = 0
         while (i := self.next()) < self.pieces:
-            span = i * self.count // self.pieces, (i + 1) * self.count // self.pieces
-            self.run(span, *self.args)
+            self._run(i)
             taken += 1
         return taken
 
@@ -315,33 +317,46 @@ class _Job:
         while (i := self.next()) < self.pieces:
             error = None
             try:
-                span = i * self.count // self.pieces, (i + 1) * self.count // self.pieces
-                self.run(span, *self.args)
+                self._run(i)
             except BaseException as raised:
                 error = raised
             self.finished.put(error)
 
+    def _run(self, i: int) -> None:
+        span = i * self.count // self.pieces, (i + 1) * self.count // self.pieces
+        self.run(span, *self.args)
+
 
 def _share(run: Callable[..., None], count: int, args: Any) -> None:
-    """Run all pieces of a loop on the threads of the current scope."""
-    job = _Job(run, count, min(count, _PIECES * _scope.threads), args)
-    _helpers.ask(job.help, min(_scope.threads, job.pieces) - 1)
-    taken = job.take()
-    for _ in range(job.pieces - taken):
-        error = job.finished.get()
-        if error is not None:
-            raise error
+    """Run all pieces of a loop on the threads that this call may use now."""
+    calls = max(1, _calls)
+    threads = min(_scope.threads, available_threads() // calls)
+    if threads < 2:
+        run((0, count), *args)
+        return
+    job = _Job(run, count, min(count, _PIECES * threads), args)
+    helpers = min(threads, job.pieces) - 1
+    _helpers.ask(job.help, helpers, min(helpers * calls, available_threads() - 1))
+    try:
+        taken = job.take()
+        for _ in range(job.pieces - taken):
+            error = job.finished.get()
+            if error is not None:
+                raise error
+    except BaseException:
+        job.pieces = 0  # nobody begins another one
+        raise
 
 
 class _Scope(threading.local):
-    """Threads that the call on this Python thread may use, itself among them."""
+    """Threads that the call on this Python thread wants, itself among them."""
 
     threads = 1
 
 
 _helpers = _Helpers()
 _scope = _Scope()
-_calls = 0  # that are running in this process, and may use threads
+_calls = 0  # that are running in this process
 _calls_lock = threading.Lock()
 
 
@@ -364,22 +379,22 @@ def available_threads() -> int:
 
 @contextmanager
 def thread_scope(threads: int) -> Iterator[bool]:
-    """Reserve threads for one call; yields whether there is more than one.
+    """Ask for threads for one call; yields whether there may be more than one.
 
-    Calls that run at the same time share what is available.
+    Calls that run at the same time share what is available, each loop anew.
     """
     global _calls
+    wanted = min(threads, available_threads())
+    before = _scope.threads
+    _scope.threads = wanted
     with _calls_lock:
         _calls += 1
-        share = available_threads() // _calls
-    before = _scope.threads
-    _scope.threads = max(1, min(threads, share))
     try:
-        yield _scope.threads > 1
+        yield wanted > 1
     finally:
         _scope.threads = before
         with _calls_lock:
-            _calls -= 1
+            _calls = max(0, _calls - 1)  # a child that was forked inside a call starts from 0
 
 
 # -- the line that explains a slow first call -------------------------------------------------
