@@ -76,9 +76,8 @@ def _unsigned(index: Any) -> Any:
     """Type of an index without negative values: an integer, or a tuple of some."""
     if isinstance(index, types.Integer):
         return types.uintp
-    if isinstance(index, types.BaseTuple):
-        return types.Tuple([_unsigned(part) for part in index])
-    return index
+    parts = getattr(index, "types", None)
+    return index if parts is None else types.Tuple([_unsigned(part) for part in parts])
 
 
 class _Compiler(CompilerBase):

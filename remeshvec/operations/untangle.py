@@ -64,7 +64,7 @@ def untangle_vertices(
         _search_rings(
             mesh, blocks, tree, on_surface, limit, 0.0, candidates, count, moved, parallel
         )
-        n_moved = np.count_nonzero(moved)
+        n_moved = int(np.count_nonzero(moved))
         if not n_moved:
             break
         total += n_moved
