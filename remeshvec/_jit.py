@@ -1,12 +1,9 @@
-"""The only place with Numba flags: three decorators, and how many threads a call may use.
+"""The only place with Numba flags: three decorators.
 
 * ``inlined``: helper, called from kernels only.
 * ``kernel``: serial kernel, called from Python.
-* ``driver``: a loop over blocks written once with ``prange``, called from Python as
-  ``name(parallel, ...)``; compiled as a serial and, when first needed, as a parallel kernel. Both
-  give the same bits, because blocks never conflict. A driver that only writes to fields of a record
-  needs these arrays as arguments of their own: Numba's parallel build (0.68) takes such writes for
-  dead code and drops the loop.
+* ``threaded``: a kernel over a range of pieces, called as ``name(parallel, ...)``; threads may share
+  the pieces (`_threads`).
 
 No ``fastmath``: results decide topology and must not depend on how a loop was vectorised.
 ``error_model="numpy"`` lets a division by zero give inf or NaN; kernels never raise.
@@ -15,14 +12,10 @@ No ``fastmath``: results decide topology and must not depend on how a loop was v
 from __future__ import annotations
 
 import hashlib
-import itertools
-import os
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
-from queue import SimpleQueue
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -34,15 +27,15 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.typed_passes import NopythonTypeInference
 from numba.extending import intrinsic
 
+from ._threads import share
+
 __all__ = [
     "add_four",
     "add_row",
-    "available_threads",
     "compile_notice",
     "driver",
     "inlined",
     "kernel",
-    "thread_scope",
     "threaded",
 ]
 
@@ -198,7 +191,7 @@ class _Threaded(kernel):
         """Run on this thread, or on all threads of the current scope."""
         count = self.count(*args)
         if parallel and count > 1:
-            _share(self.serial, count, args)
+            share(self.serial, count, args)
         else:
             self.serial((0, count), *args)
 
@@ -258,142 +251,6 @@ def _feed(digest: Any, code: CodeType, scope: dict[str, Any], seen: set[CodeType
             digest.update(repr(value).encode())
         elif hasattr(value, "tobytes"):
             digest.update(value.tobytes())
-
-
-# -- threads ----------------------------------------------------------------------------------
-
-# Kernels release the GIL, so plain Python threads run them at once, on one build. Numba's own parallel
-# loops would need a second one (30 s of compilation), cannot be entered by two Python threads at once nor
-# after a fork, and wait for all their threads at the end of every loop, for milliseconds if another
-# process holds a core. Here whoever is awake takes the next piece.
-
-_PIECES = 4  # for each thread: where one is held up, the others take its pieces
-
-
-class _Helpers:
-    """Threads that wait for work, shared by all calls of this process."""
-
-    def __init__(self) -> None:
-        self.jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self.count = 0
-        self.lock = threading.Lock()
-
-    def ask(self, job: Callable[[], None], count: int, most: int) -> None:
-        """Let up to ``count`` threads do a job, of ``most`` that there should be when all are busy."""
-        with self.lock:
-            while self.count < most:
-                try:
-                    threading.Thread(target=self._work, daemon=True, name="remeshvec").start()
-                except RuntimeError:  # no more threads to be had; the caller does the work
-                    break
-                self.count += 1
-        for _ in range(min(count, self.count)):
-            self.jobs.put(job)
-
-    def _work(self) -> None:
-        while True:
-            self.jobs.get()()
-
-
-class _Job:
-    """The pieces of one loop: whoever comes takes the next."""
-
-    def __init__(self, run: Callable[..., None], count: int, pieces: int, args: Any) -> None:
-        self.run, self.count, self.pieces, self.args = run, count, pieces, args
-        self.next = itertools.count().__next__  # atomic
-        self.finished: SimpleQueue[BaseException | None] = SimpleQueue()
-
-    def take(self) -> int:
-        """Run pieces until none is left; returns how many."""
-        taken = 0
-        while (i := self.next()) < self.pieces:
-            self._run(i)
-            taken += 1
-        return taken
-
-    def help(self) -> None:
-        """Run pieces on another thread."""
-        while (i := self.next()) < self.pieces:
-            error = None
-            try:
-                self._run(i)
-            except BaseException as raised:
-                error = raised
-            self.finished.put(error)
-
-    def _run(self, i: int) -> None:
-        span = i * self.count // self.pieces, (i + 1) * self.count // self.pieces
-        self.run(span, *self.args)
-
-
-def _share(run: Callable[..., None], count: int, args: Any) -> None:
-    """Run all pieces of a loop on the threads that this call may use now."""
-    calls = max(1, _calls)
-    threads = min(_scope.threads, available_threads() // calls)
-    if threads < 2:
-        run((0, count), *args)
-        return
-    job = _Job(run, count, min(count, _PIECES * threads), args)
-    helpers = min(threads, job.pieces) - 1
-    _helpers.ask(job.help, helpers, min(helpers * calls, available_threads() - 1))
-    try:
-        taken = job.take()
-        for _ in range(job.pieces - taken):
-            error = job.finished.get()
-            if error is not None:
-                raise error
-    except BaseException:
-        job.pieces = 0  # nobody begins another one
-        raise
-
-
-class _Scope(threading.local):
-    """Threads that the call on this Python thread wants, itself among them."""
-
-    threads = 1
-
-
-_helpers = _Helpers()
-_scope = _Scope()
-_calls = 0  # that are running in this process
-_calls_lock = threading.Lock()
-
-
-def _after_fork() -> None:
-    """Start anew: a forked child has no threads but its own."""
-    global _helpers, _calls, _calls_lock
-    _helpers = _Helpers()
-    _calls = 0
-    _calls_lock = threading.Lock()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_after_fork)
-
-
-def available_threads() -> int:
-    """Count the threads that a call may use at most (Numba's limit, which follows the CPU mask)."""
-    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-
-
-@contextmanager
-def thread_scope(threads: int) -> Iterator[bool]:
-    """Ask for threads for one call; yields whether there may be more than one.
-
-    Calls that run at the same time share what is available, each loop anew.
-    """
-    global _calls
-    wanted = min(threads, available_threads())
-    before = _scope.threads
-    _scope.threads = wanted
-    with _calls_lock:
-        _calls += 1
-    try:
-        yield wanted > 1
-    finally:
-        _scope.threads = before
-        with _calls_lock:
-            _calls = max(0, _calls - 1)  # a child that was forked inside a call starts from 0
 
 
 # -- the line that explains a slow first call -------------------------------------------------

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jit import compile_notice, thread_scope
+from ._jit import compile_notice
+from ._threads import thread_scope
 from ._types import FIXED, FROZEN, NONE, Blocks, FloatArray, IndexArray, Mesh
 from .clean import weld_vertices
 from .constraints import Constraints

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ._check import positive_count
-from ._jit import available_threads
+from ._threads import available_threads
 from .errors import OptionError
 
 __all__ = ["PRESETS", "Options", "make_options"]

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._check import as_mesh, positive_count
-from ._jit import compile_notice, thread_scope
+from ._jit import compile_notice
+from ._threads import thread_scope
 from ._types import FloatArray, Mesh
 from .constraints import Constraints, make_constraints
 from .edge_sets import make_blocks

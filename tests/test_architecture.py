@@ -13,7 +13,7 @@ PACKAGE = ROOT / "remeshvec"
 
 # Lower numbers may not import higher ones; the same number may not import itself but for `SIDEWAYS`.
 LEVELS = {
-    0: ["_types", "_jit", "_check", "errors"],
+    0: ["_types", "_jit", "_threads", "_check", "errors"],
     1: ["geometry"],
     2: ["halfedge", "order", "orient", "edge_sets", "bvh", "curves", "polyline", "clean"],
     3: [
@@ -35,7 +35,7 @@ LEVELS = {
     8: ["__main__"],
 }  # fmt: skip
 SIDEWAYS = {
-    ("_check", "errors"),
+    ("_check", "errors"), ("_jit", "_threads"),
     ("bvh", "halfedge"), ("curves", "halfedge"), ("orient", "halfedge"), ("polyline", "halfedge"),
     ("creases", "_chains"), ("creases", "_echo"), ("sizing", "curvature"), ("sizing", "gradation"),
     ("operations.collapse", "operations.guards"), ("operations.siblings", "operations.collapse"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from remeshvec import OptionError
-from remeshvec._jit import available_threads
+from remeshvec._threads import available_threads
 from remeshvec.options import PRESETS, make_options
 
 

@@ -1,0 +1,149 @@
+"""Threads: the pieces of a loop are shared by plain Python threads.
+
+Kernels release the GIL, so plain Python threads run them at once, on one build. Numba's own parallel
+loops would need a second one, cannot be entered by two Python threads at once nor after a fork, and wait
+for all their threads at the end of every loop, for milliseconds if another process holds a core. Here
+whoever is awake takes the next piece.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from queue import SimpleQueue
+from typing import Any
+
+import numba
+
+__all__ = ["available_threads", "share", "thread_scope"]
+
+_PIECES = 4  # for each thread: where one is held up, the others take its pieces
+
+
+class _Helpers:
+    """Threads that wait for work, shared by all calls of this process."""
+
+    def __init__(self) -> None:
+        self.jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self.count = 0
+        self.lock = threading.Lock()
+
+    def ask(self, job: Callable[[], None], count: int, most: int) -> None:
+        """Let up to ``count`` threads do a job, of ``most`` that there should be when all are busy."""
+        with self.lock:
+            while self.count < most:
+                try:
+                    threading.Thread(target=self._work, daemon=True, name="remeshvec").start()
+                except RuntimeError:  # no more threads to be had; the caller does the work
+                    break
+                self.count += 1
+        for _ in range(min(count, self.count)):
+            self.jobs.put(job)
+
+    def _work(self) -> None:
+        while True:
+            self.jobs.get()()
+
+
+class _Job:
+    """The pieces of one loop: whoever comes takes the next."""
+
+    def __init__(self, run: Callable[..., None], count: int, pieces: int, args: Any) -> None:
+        self.run, self.count, self.pieces, self.args = run, count, pieces, args
+        self.next = itertools.count().__next__  # atomic
+        self.finished: SimpleQueue[BaseException | None] = SimpleQueue()
+
+    def take(self) -> int:
+        """Run pieces until none is left; returns how many."""
+        taken = 0
+        while (i := self.next()) < self.pieces:
+            self._run(i)
+            taken += 1
+        return taken
+
+    def help(self) -> None:
+        """Run pieces on another thread."""
+        while (i := self.next()) < self.pieces:
+            error = None
+            try:
+                self._run(i)
+            except BaseException as raised:
+                error = raised
+            self.finished.put(error)
+
+    def _run(self, i: int) -> None:
+        span = i * self.count // self.pieces, (i + 1) * self.count // self.pieces
+        self.run(span, *self.args)
+
+
+def share(run: Callable[..., None], count: int, args: Any) -> None:
+    """Run all pieces of a loop on the threads that this call may use now."""
+    calls = max(1, _calls)
+    threads = min(_scope.threads, available_threads() // calls)
+    if threads < 2:
+        run((0, count), *args)
+        return
+    job = _Job(run, count, min(count, _PIECES * threads), args)
+    helpers = min(threads, job.pieces) - 1
+    _helpers.ask(job.help, helpers, min(helpers * calls, available_threads() - 1))
+    try:
+        taken = job.take()
+        for _ in range(job.pieces - taken):
+            error = job.finished.get()
+            if error is not None:
+                raise error
+    except BaseException:
+        job.pieces = 0  # nobody begins another one
+        raise
+
+
+class _Scope(threading.local):
+    """Threads that the call on this Python thread wants, itself among them."""
+
+    threads = 1
+
+
+_helpers = _Helpers()
+_scope = _Scope()
+_calls = 0  # that are running in this process
+_calls_lock = threading.Lock()
+
+
+def _after_fork() -> None:
+    """Start anew: a forked child has no threads but its own."""
+    global _helpers, _calls, _calls_lock
+    _helpers = _Helpers()
+    _calls = 0
+    _calls_lock = threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
+def available_threads() -> int:
+    """Count the threads that a call may use at most (Numba's limit, which follows the CPU mask)."""
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+
+
+@contextmanager
+def thread_scope(threads: int) -> Iterator[bool]:
+    """Ask for threads for one call; yields whether there may be more than one.
+
+    Calls that run at the same time share what is available, each loop anew.
+    """
+    global _calls
+    wanted = min(threads, available_threads())
+    before = _scope.threads
+    _scope.threads = wanted
+    with _calls_lock:
+        _calls += 1
+    try:
+        yield wanted > 1
+    finally:
+        _scope.threads = before
+        with _calls_lock:
+            _calls = max(0, _calls - 1)  # a child that was forked inside a call starts from 0
