@@ -240,6 +240,8 @@ class Sweeps:
                 if refined is mesh:
                     break
                 mesh, blocks = refined, make_blocks(refined)
+            else:
+                flags = measure_edges(mesh, blocks, factor, self.options.collapse[sweep], parallel)
         self.counts[-1]["split"] = count
         return mesh, blocks, flags
 

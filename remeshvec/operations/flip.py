@@ -187,7 +187,8 @@ def valence_gain(mesh, h, t):
     c = excess[mesh.origin[previous(h)]]
     d = excess[mesh.origin[previous(t)]]
     # Each of the four comes one nearer to its ideal, or one farther away.
-    gain = 2 * ((a > 0) + (b > 0) + (c < 0) + (d < 0)) - 4
+    nearer = np.int64(a > 0) + np.int64(b > 0) + np.int64(c < 0) + np.int64(d < 0)
+    gain = 2 * nearer - 4
     return -1 if min(a, b) <= -3 else gain
 
 
