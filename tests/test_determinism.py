@@ -1,9 +1,7 @@
-"""The same bits on any number of threads, and from every serial and parallel build of a driver."""
+"""The same bits on any number of threads, and whatever the order in which they take the blocks."""
 
-import importlib
 import json
 import os
-import pkgutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,21 +10,25 @@ import nonmanifold
 import numpy as np
 import pytest
 import zoo
+from pieces import on_threads, shuffled
+from strict import all_modules
 from structure import assert_same_bits, assert_valid, blocks_of, copied, featured, locate, project
 
 import remeshvec
-from remeshvec._jit import driver
+from remeshvec import _jit
 from remeshvec._types import FIXED, NONE
-from remeshvec.bvh import closest_faces
+from remeshvec.bvh import Surface, closest_faces
+from remeshvec.operations.bisect import bisect_edges
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.flip import FlipLimits, flip_edges
+from remeshvec.operations.measure import measure_edges
 from remeshvec.operations.project import project_curves, read_lengths
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
 from remeshvec.operations.unfold import undo_folds
-from remeshvec.operations.untangle import untangle_vertices
+from remeshvec.operations.untangle import approach_vertices, untangle_vertices
 from remeshvec.prepare import prepare
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -40,7 +42,9 @@ def mesh():
 
 
 def same(one, two):
-    if isinstance(one, tuple):
+    if isinstance(one, Surface):
+        same(one.tree, two.tree)
+    elif isinstance(one, tuple):
         for x, y in zip(one, two, strict=True):
             same(x, y)
     else:
@@ -51,15 +55,18 @@ def phases():
     """Name and call of every phase; a call gets mesh, blocks, reference and the build to use."""
     collapses = CollapseLimits(0.8, 4 / 3, 0.9, 0.5, False)
     flips = FlipLimits(0.7, True, False)
-    yield "flip", lambda m, b, r, p: flip_edges(m, b, flips, p)
+    yield "measure", lambda m, b, r, p: tuple(measure_edges(m, b, 1.0, 0.8, p))
+    yield "flip", lambda m, b, r, p: flip_edges(m, b, flips, p, passes=3)
     yield "collapse", lambda m, b, r, p: collapse_short_edges(m, b, collapses, p)
+    yield "bisect", lambda m, b, r, p: bisect_edges(m, b, measure_edges(m, b, 1.3, 0.8, p), p)
     yield "slide", lambda m, b, r, p: slide_vertices(m, b, r, p)
     for stiffness in (20.0, 0.0):
         yield "relax", lambda m, b, r, p, s=stiffness: relax_vertices(m, b, s, p)
     yield "unfold", lambda m, b, r, p: unfold(m, b, p)
     yield "project", lambda m, b, r, p: project(shifted(m), r, b, p)
     yield "project curves", lambda m, b, r, p: project_curves(shifted(m), b, r, p)
-    yield "untangle", lambda m, b, r, p: untangle_vertices(m, b, r.tree, True, 0.8, p)
+    yield "untangle", lambda m, b, r, p: untangle_vertices(m, b, r.tree, True, 0.8, 2, p)
+    yield "approach", lambda m, b, r, p: approach_vertices(m, b, r.tree, True, 0.33, 1e-4, p)
     yield "fit", lambda m, b, r, p: fit_vertices(m, b, r.tree, 0.1, p)
     yield "locate", lambda m, b, r, p: locate(m, r, b, p)
     yield "lengths", lambda m, b, r, p: read_lengths(stretched(m), b, r, p)
@@ -88,54 +95,81 @@ def queries(mesh):
     return mesh.X[:, :3].copy(), np.full(len(mesh.X), NONE, np.int32)
 
 
-def test_every_driver_is_the_same_in_both_builds(monkeypatch):
+def in_every_way(call):
+    """Results of ``call(parallel)`` on one thread, on four, and with its pieces in some other order."""
+    with on_threads(1):
+        results = [call(False)]
+    with on_threads(4):
+        results.append(call(True))
+    with shuffled() as order:
+        results.append(call(True))
+    ORDERED.update(order.seen)
+    return results
+
+
+ORDERED: set[str] = set()  # kernels whose pieces were shuffled
+
+
+def test_every_kernel_is_the_same_in_any_order(monkeypatch):
     V, F = mesh()
-    both = [prepare(V, F, parallel) for parallel in (False, True)]
-    assert_same_bits(both[0].mesh, both[1].mesh)
-    L = 1.3 * zoo.mean_edge(V, F) * both[0].scale
-    references = []
-    for one, parallel in zip(both, (False, True), strict=True):
-        lengths = L * (1 + 0.3 * np.sin(4 * one.mesh.X[:, 0]))
-        labels = (one.mesh.X[one.mesh.origin.reshape(-1, 3), 1].mean(axis=1) > 0).astype(int)
-        references.append(
-            featured(one.mesh, lengths, parallel=parallel, face_labels=labels).reference
-        )
-    same(tuple(references[0]), tuple(references[1]))
-    assert_same_bits(both[0].mesh, both[1].mesh)
-    current, reference = both[0].mesh, references[0]
+    ready = in_every_way(lambda parallel: prepare(V, F, parallel))
+    L = 1.3 * zoo.mean_edge(V, F) * ready[0].scale
+    lengths = L * (1 + 0.3 * np.sin(4 * ready[0].mesh.X[:, 0]))
+    labels = (ready[0].mesh.X[ready[0].mesh.origin.reshape(-1, 3), 1].mean(axis=1) > 0).astype(int)
+
+    def referenced(parallel):
+        one = ready.pop(0).mesh
+        reference = featured(one, lengths, parallel=parallel, face_labels=labels).reference
+        assert reference.tree is not None  # built here, not when it is first asked for
+        return one, reference
+
+    for one in ready[1:]:
+        assert_same_bits(ready[0].mesh, one.mesh)
+    ready = in_every_way(referenced)
+    for one in ready[1:]:
+        assert_same_bits(ready[0][0], one[0])
+        same(tuple(ready[0][1]), tuple(one[1]))
+    current, reference = ready[0]
     for _ in range(2):
         blocks = blocks_of(current, 100, monkeypatch)
         assert len(blocks.face) > 10
-        done = [split_long_edges(current, blocks, 1.0, parallel) for parallel in (False, True)]
-        assert done[0][1] == done[1][1]
-        assert_same_bits(done[0][0], done[1][0])
+        done = in_every_way(lambda p: split_long_edges(current, blocks, 1.0, p))  # noqa: B023
+        for one in done[1:]:
+            assert one[1] == done[0][1]
+            assert_same_bits(one[0], done[0][0])
         current = done[0][0]
         blocks = blocks_of(current, 100, monkeypatch)
         for name, phase in phases():
-            other = copied(current)
-            before = copied(current)
-            results = [phase(m, blocks, reference, p) for m, p in ((current, False), (other, True))]
-            assert_same_bits(current, other)
-            if results[0] is not None:
-                same(results[0], results[1])
+            copies = []
+
+            def run(parallel, phase=phase, copies=copies):
+                copies.append(copied(current))  # noqa: B023
+                return phase(copies[-1], blocks, reference, parallel)  # noqa: B023
+
+            results = in_every_way(run)
+            for one, result in zip(copies[1:], results[1:], strict=True):
+                assert_same_bits(copies[0], one)
+                if result is not None:
+                    same(results[0], result)
+            # It did something: runs that all leave out their loops would agree as well.
+            changed = any(
+                not np.array_equal(*pair) for pair in zip(current, copies[0], strict=True)
+            )
+            assert changed or name in ("locate", "closest", "measure"), name
+            current = copies[0]
             assert_valid(current)
-            # It did something: two builds that both drop their loops would agree as well.
-            changed = any(not np.array_equal(x, y) for x, y in zip(current, before, strict=True))
-            assert changed or name in ("locate", "closest"), name
-        packed = [compact(current, blocks, parallel) for parallel in (False, True)]
-        assert_same_bits(*packed)
+        packed = in_every_way(lambda p: compact(current, blocks, p, 0.1))  # noqa: B023
+        for one in packed[1:]:
+            assert_same_bits(packed[0], one)
         current = packed[0]
-    unused = [one.__name__ for one in drivers() if "parallel" not in vars(one)]
-    assert not unused, "drivers that this test does not reach"
+    unused = {one.__name__ for one in kernels(_jit._Threaded)} - ORDERED
+    unused |= {one.__name__ for one in kernels(_jit.driver) if "parallel" not in vars(one)}
+    assert not unused, "kernels that this test does not reach"
 
 
-def drivers():
-    for info in pkgutil.walk_packages(remeshvec.__path__, "remeshvec."):
-        if info.name.rsplit(".", 1)[-1] in ("__main__", "viz", "cli"):
-            continue
-        for value in vars(importlib.import_module(info.name)).values():
-            if isinstance(value, driver):
-                yield value
+def kernels(kind):
+    for module in all_modules():
+        yield from (value for value in vars(module).values() if isinstance(value, kind))
 
 
 def test_results_hardly_depend_on_the_blocks(monkeypatch):
@@ -153,8 +187,8 @@ def test_results_hardly_depend_on_the_blocks(monkeypatch):
 
 SCRIPT = """
 import hashlib, json, sys
-import numpy as np, numba
-from remeshvec import edge_sets, remesh
+import numpy as np
+from remeshvec import _threads, edge_sets, remesh
 module = sys.modules["remeshvec.sweeps"]
 path, per_block, threshold, options = json.loads(sys.argv[1])
 data = np.load(path)
@@ -164,7 +198,7 @@ for threads, faces in ((1, threshold), (2, threshold), (4, threshold), (4, 10**9
     module._PARALLEL_FACES = faces
     used = []
     r = remesh(data["V"], data["F"], data["L"] if data["L"].ndim else float(data["L"]), threads=threads,
-               callback=lambda *_: used.append(numba.get_num_threads()), **options)
+               callback=lambda *_: used.append(_threads._scope.threads), **options)
     digest = hashlib.sha256()
     for x in (r.V, r.F, r.birth_face, r.birth_barycentric, r.vertex_map, r.face_map, r.feature_edges,
               r.corners, r.lengths):
@@ -256,7 +290,7 @@ def test_repeated_calls_and_other_calls_between():
 
 
 def test_concurrent_calls_give_the_same_bits(monkeypatch):
-    """Numba's pool takes one caller at a time; whoever comes second runs serially."""
+    """They share the threads, and may run one another's pieces."""
     from concurrent.futures import ThreadPoolExecutor
 
     monkeypatch.setattr(sys.modules["remeshvec.sweeps"], "_PARALLEL_FACES", 0)

@@ -10,7 +10,7 @@ from structure import assert_same_bits, blocks_of, built, copied, half_edge, tre
 
 from remeshvec import edge_sets
 from remeshvec._types import Blocks
-from remeshvec.edge_sets import OWNED, REST, SHIFTED, list_range, stage_blocks, vertex_range
+from remeshvec.edge_sets import OWNED, REST, SHIFTED, list_range, per_stage_block, vertex_range
 from remeshvec.operations import collapse, flip, untangle
 
 
@@ -45,12 +45,13 @@ def test_one_block_needs_one_stage():
 @pytest.mark.parametrize("stage", [OWNED, SHIFTED, REST])
 def test_ranges_of_a_stage_are_disjoint(stage):
     blocks = Blocks(np.arange(0, 60, 10), np.array([0, 3, 9, 9, 20, 31]))
-    ranges = [vertex_range(blocks, stage, k) for k in range(stage_blocks(blocks, stage))]
+    pieces = range(per_stage_block(None, blocks, stage))
+    ranges = [vertex_range(blocks, stage, k) for k in pieces]
     assert all(low <= high for low, high in ranges)
     assert all(one[1] <= two[0] for one, two in pairwise(ranges))
     if stage == OWNED:
         assert ranges[0][0] == 0 and ranges[-1][1] == 31
-    lists = [range(*list_range(blocks, stage, k)) for k in range(stage_blocks(blocks, stage))]
+    lists = [range(*list_range(blocks, stage, k)) for k in pieces]
     if stage == REST:
         assert ranges == [(0, 31)] and list(lists[0]) == [0, 1, 2, 3, 4]
     if stage == OWNED:
@@ -59,7 +60,9 @@ def test_ranges_of_a_stage_are_disjoint(stage):
 
 def test_shifted_ranges_cover_the_borders():
     blocks = Blocks(np.arange(0, 50, 10), np.array([0, 10, 20, 30, 40]))
-    ranges = [vertex_range(blocks, SHIFTED, k) for k in range(stage_blocks(blocks, SHIFTED))]
+    ranges = [
+        vertex_range(blocks, SHIFTED, k) for k in range(per_stage_block(None, blocks, SHIFTED))
+    ]
     assert ranges == [(5, 15), (15, 25), (25, 35)]
 
 
@@ -89,13 +92,26 @@ def all_but_the_last_vertex(mesh):
     return Blocks(np.array([0, m, m], np.int64), np.array([0, n - 1, n], np.int64))
 
 
-def run_owned(driver, mesh, blocks, limits, h, n_outcomes):
+def run_owned(driver, mesh, blocks, limits, h, n_outcomes, *marks):
     """Run one candidate through the first stage; returns whether it was dealt with."""
     candidates = np.full(mesh.origin.size, h, np.int32)
     count = np.array([1, 0], np.int64)
     tally = np.zeros((2, n_outcomes), np.int64)
-    driver(False, mesh, blocks, OWNED, limits, candidates, count, tally)
+    driver(False, mesh, blocks, OWNED, limits, candidates, count, *marks, tally)
     return candidates[0] == edge_sets.DONE
+
+
+def flip_owned(mesh, blocks, h):
+    """Likewise for a flip; what it touches is its quad."""
+    quad = {int(mesh.origin[g]) for side in (h, mesh.twin[h]) for g in face_of(side)}
+    touched = np.zeros(len(mesh.X), np.uint8)
+    done = run_owned(flip._flip, mesh, blocks, FLIPS, h, flip.N_OUTCOMES, touched)
+    assert set(np.flatnonzero(touched).tolist()) == (quad if done else set())
+    return done
+
+
+def face_of(h):
+    return range(h - h % 3, h - h % 3 + 3)
 
 
 FLIPS = flip.FlipLimits(normal_cosine=0.0, delaunay_ties=True, sliver_check=False)
@@ -118,7 +134,7 @@ def wanted(V, F, quad_vertices):
 def test_the_flip_itself_is_wanted():
     mesh = wanted(*quad(), range(4))
     blocks = Blocks(np.array([0, 6, 6]), np.array([0, 6, 6]))
-    assert run_owned(flip._flip, mesh, blocks, FLIPS, half_edge(mesh, 0, 1), flip.N_OUTCOMES)
+    assert flip_owned(mesh, blocks, half_edge(mesh, 0, 1))
     half_edge(mesh, 2, 3)
 
 
@@ -130,10 +146,7 @@ def test_a_flip_owns_the_four_vertices_of_its_quad(outside):
     before = copied(mesh)
     h = half_edge(mesh, new[0], new[1])
     for side in (h, int(mesh.twin[h])):
-        done = run_owned(
-            flip._flip, mesh, all_but_the_last_vertex(mesh), FLIPS, side, flip.N_OUTCOMES
-        )
-        assert not done
+        assert not flip_owned(mesh, all_but_the_last_vertex(mesh), side)
         assert_same_bits(mesh, before)
 
 
@@ -142,7 +155,7 @@ def test_a_flip_owns_no_more_than_its_quad(outside):
     V, F, new = with_last(*quad(), outside)
     mesh = wanted(V, F, new[:4])
     h = half_edge(mesh, new[0], new[1])
-    assert run_owned(flip._flip, mesh, all_but_the_last_vertex(mesh), FLIPS, h, flip.N_OUTCOMES)
+    assert flip_owned(mesh, all_but_the_last_vertex(mesh), h)
     half_edge(mesh, new[2], new[3])
 
 
@@ -197,7 +210,7 @@ def test_a_move_owns_the_closed_ring_of_its_vertex():
         W, G, new = with_last(V, F, v)
         mesh = built(W, G)
         candidates = np.full(len(W), new[centre], np.int32)
-        moved, count = np.zeros(2, np.int64), np.array([1, 0])
+        moved, count = np.zeros(len(W), np.uint8), np.array([1, 0])
         tree = tree_of(mesh)
         blocks = all_but_the_last_vertex(mesh)
         untangle._untangle(

@@ -193,7 +193,7 @@ class Phases:
         self.mesh = compact(self.mesh, self.blocks, False)
         self.check("compact")
         tree = self.reference.tree
-        untangle_vertices(self.mesh, self.blocks, tree, self.o["project"], cosine(42), False)
+        untangle_vertices(self.mesh, self.blocks, tree, self.o["project"], cosine(42), 2, False)
         self.check("untangle")
         if self.o["fit"]:
             fit_vertices(self.mesh, self.blocks, tree, 0.2, False)

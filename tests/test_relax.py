@@ -7,7 +7,8 @@ import pytest
 import zoo
 from structure import assert_valid, blocks_of, built, faces_of, one_block
 
-from remeshvec._types import CURVE, FIXED, HELD, PINNED
+from remeshvec._types import CURVE, FIXED, HELD, NONE, PINNED
+from remeshvec.edge_sets import stages
 from remeshvec.geometry import SHARP
 from remeshvec.operations import relax
 from remeshvec.operations.relax import relax_vertices
@@ -82,14 +83,19 @@ def test_areas_are_mixed_voronoi_areas(name, per_block, monkeypatch):
     mesh = built(*bumpy(name), ordered=True)
     V, F = mesh.X[:, :3].copy(), faces_of(mesh).astype(np.int64)
     blocks = blocks_of(mesh, per_block, monkeypatch)
-    points, across = np.empty((len(V), 4)), np.empty(len(F), np.int32)
+    weighted, across = np.empty((len(V), 4)), np.empty(len(F), np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
-    relax._sum_areas(False, mesh, blocks, points, across, count)
-    relax._sum_areas_across(mesh, blocks, points, across, count)
-    assert np.array_equal(points[:, :3], V)
+    relax._sum_areas(False, mesh, blocks, weighted, across, count)
+    for stage in stages(blocks)[1:]:
+        relax._sum_areas_across(False, mesh, blocks, stage, weighted, across, count)
+    areas = weighted[:, 3].copy()
     expected = igl.massmatrix(V, F, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
-    assert points[:, 3] == pytest.approx(expected, rel=1e-9)
-    assert points[:, 3].sum() == pytest.approx(zoo.area(V, F))
+    assert areas == pytest.approx(expected, rel=1e-9)
+    assert areas.sum() == pytest.approx(zoo.area(V, F))
+    relax._weight(False, mesh, blocks, weighted)
+    on_boundary = mesh.twin[mesh.vertex_halfedge] == NONE
+    assert np.array_equal(weighted[:, 3], np.where(on_boundary, 2 * areas, areas))  # lengths are 1
+    assert np.array_equal(weighted[:, :3], weighted[:, 3:] * V)
 
 
 @pytest.mark.parametrize("name", ["planar_delaunay", "annulus"])

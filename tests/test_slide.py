@@ -16,6 +16,7 @@ from structure import (
     featured,
     next_of,
     one_block,
+    packed,
 )
 
 from remeshvec._types import CURVE, FIXED, HELD, INNER, NONE, PINNED, SEAM
@@ -36,6 +37,7 @@ def curved(name, factor=0.8, seed=0, lengths=None):
     reference = featured(mesh, factor * zoo.mean_edge(V, F), feature_angle=40.0).reference
     for _ in range(2):
         mesh, _ = split_long_edges(mesh, one_block(mesh), 1.2, False)
+    mesh = packed(mesh)
     shaken(mesh, reference, 0.25 * mesh.X[0, 3], seed)
     if lengths is not None:
         mesh.X[:, 3] = lengths(mesh.X)

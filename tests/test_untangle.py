@@ -17,7 +17,7 @@ from structure import (
 
 from remeshvec._types import FIXED, INNER
 from remeshvec.operations.fit import fit_vertices
-from remeshvec.operations.untangle import untangle_vertices
+from remeshvec.operations.untangle import approach_vertices, untangle_vertices
 
 MESHES = ["icosphere", "torus", "planar_delaunay", "annulus", "genus_2"]
 
@@ -38,9 +38,10 @@ def smallest_angles(mesh):
     )
 
 
-def untangled(mesh, reference, degrees, on_surface=False):
+def untangled(mesh, reference, degrees, on_surface=False, rounds=1):
     cosine = np.cos(np.radians(degrees))
-    return untangle_vertices(mesh, one_block(mesh), reference.tree, on_surface, cosine, False)
+    blocks = one_block(mesh)
+    return untangle_vertices(mesh, blocks, reference.tree, on_surface, cosine, rounds, False)
 
 
 @pytest.mark.parametrize("on_surface", [False, True])
@@ -150,7 +151,7 @@ THIRD = 1 / 3  # squared circumradius of an equilateral triangle, in squared edg
 
 def by_distance(mesh, reference, distance):
     blocks = one_block(mesh)
-    return untangle_vertices(mesh, blocks, reference.tree, True, THIRD, False, distance)
+    return approach_vertices(mesh, blocks, reference.tree, True, THIRD, distance, False)
 
 
 def costs(mesh, reference, distance):

@@ -1,0 +1,42 @@
+"""Run loops over pieces on several threads, or one piece after the other in any order."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from unittest.mock import patch
+
+import numpy as np
+
+from remeshvec import _jit, _threads
+
+
+@contextmanager
+def on_threads(n: int):
+    """Let ``parallel=True`` mean so many threads, whatever the machine has."""
+    before = _threads._scope.threads
+    with patch.object(_threads, "available_threads", lambda: n):
+        _threads._scope.threads = n
+        try:
+            yield
+        finally:
+            _threads._scope.threads = before
+
+
+class Shuffled:
+    """Stand-in for `_threads.share`: runs pieces alone, in a random order; remembers whose."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.seen: set[str] = set()
+
+    def __call__(self, run, count, args) -> None:
+        self.seen.add(getattr(run, "py_func", run).__name__.removesuffix("_serial"))
+        for k in self.rng.permutation(count).tolist():
+            run((k, k + 1), *args)
+
+
+@contextmanager
+def shuffled(seed: int = 0):
+    """Let ``parallel=True`` mean an order that no thread would take."""
+    with patch.object(_jit, "share", Shuffled(seed)) as order:
+        yield order
