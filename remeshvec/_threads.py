@@ -35,11 +35,12 @@ class _Helpers:
         """Let up to ``count`` threads do a job, of ``most`` that there should be when all are busy."""
         with self.lock:
             while self.count < most:
+                self.count += 1  # before: an interrupt may come while the thread starts
                 try:
                     threading.Thread(target=self._work, daemon=True, name="remeshvec").start()
                 except RuntimeError:  # no more threads to be had; the caller does the work
+                    self.count -= 1
                     break
-                self.count += 1
         for _ in range(min(count, self.count)):
             self.jobs.put(job)
 
