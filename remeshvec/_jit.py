@@ -1,7 +1,7 @@
 """The only place with Numba flags: three decorators.
 
 * ``inlined``: helper, called from kernels only.
-* ``kernel``: serial kernel, called from Python.
+* ``kernel``: kernel, called from Python.
 * ``threaded``: a kernel over a range of pieces, called as ``name(parallel, ...)``; threads may share
   the pieces (`_threads`).
 
@@ -33,7 +33,6 @@ __all__ = [
     "add_four",
     "add_row",
     "compile_notice",
-    "driver",
     "inlined",
     "kernel",
     "threaded",
@@ -150,7 +149,7 @@ if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 
 class kernel:  # lower case: a decorator, used like a function
-    """Compile a serial kernel when it is first called."""
+    """Compile a kernel when it is first called."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.py_func: Any = function
@@ -158,13 +157,13 @@ class kernel:  # lower case: a decorator, used like a function
         self.__name__ = function.__name__
 
     @cached_property
-    def serial(self) -> Any:
-        """The serial build."""
-        return numba.njit(cache=True, **_FLAGS)(_keyed(self.py_func, "serial"))
+    def compiled(self) -> Any:
+        """The function, compiled by Numba for the types of its arguments."""
+        return numba.njit(cache=True, **_FLAGS)(_keyed(self.py_func))
 
     def __call__(self, *args: Any) -> Any:
         """Run."""
-        return self.serial(*args)
+        return self.compiled(*args)
 
 
 class threaded:
@@ -191,41 +190,28 @@ class _Threaded(kernel):
         """Run on this thread, or on all threads of the current scope."""
         count = self.count(*args)
         if parallel and count > 1:
-            share(self.serial, count, args)
+            share(self.compiled, count, args)
         else:
-            self.serial((0, count), *args)
+            self.compiled((0, count), *args)
 
 
-class driver(kernel):
-    """Compile a ``prange`` loop over blocks twice: serial, and parallel when first needed."""
-
-    @cached_property
-    def parallel(self) -> Any:
-        """The parallel build."""
-        return numba.njit(cache=True, parallel=True, **_FLAGS)(_keyed(self.py_func, "parallel"))
-
-    def __call__(self, parallel: bool, *args: Any) -> Any:
-        """Run on one thread, or on all threads of the current scope."""
-        return self.parallel(*args) if parallel else self.serial(*args)
-
-
-def _keyed(function: Any, suffix: str) -> FunctionType:
+def _keyed(function: Any) -> FunctionType:
     """Copy a function under a name that holds a digest of its code and of all that it calls.
 
-    Numba's disk cache does not see edits in imported modules or in helpers, nor does it tell the
-    serial build of a function from the parallel one. Both are part of the name here, and the name
-    is part of the key. To be called late: helpers may be defined below the kernel.
+    Numba's disk cache does not see edits in imported modules or in helpers. They are part of the name
+    here, and the name is part of the key. To be called late: helpers may be defined below the kernel.
     """
     digest = hashlib.sha256(repr((sorted(_FLAGS.items()), sorted(_INLINED.items()))).encode())
+    _feed(digest, _UnsignedIndices.run_pass.__code__, globals(), set())
     _feed(digest, function.__code__, function.__globals__, set())
     copy = FunctionType(
         function.__code__,
         function.__globals__,
-        f"{function.__name__}_{suffix}",
+        function.__name__,
         function.__defaults__,
         function.__closure__,
     )
-    copy.__qualname__ = f"{function.__qualname__}_{suffix}_{digest.hexdigest()[:12]}"
+    copy.__qualname__ = f"{function.__qualname__}_{digest.hexdigest()[:12]}"
     copy.__doc__ = function.__doc__
     copy.__module__ = function.__module__
     return copy

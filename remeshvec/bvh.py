@@ -11,9 +11,8 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numba import prange
 
-from ._jit import driver, inlined, kernel
+from ._jit import inlined, kernel, threaded
 from ._types import NONE, FloatArray, IndexArray, Tree
 from .geometry import closest_on_triangle, face_vector
 from .halfedge import following, previous
@@ -118,9 +117,9 @@ def build_tree(
     return Tree(corners, twin, patch, boxes, level)
 
 
-@driver
-def _fill_leaves(X, F, corners, boxes):
-    for leaf in prange(-(-F.shape[0] // _LEAF)):
+@threaded(lambda X, F, *_: -(-len(F) // _LEAF))
+def _fill_leaves(span, X, F, corners, boxes):
+    for leaf in range(span[0], span[1]):
         for i in range(3):
             boxes[leaf, i] = np.inf
             boxes[leaf, 3 + i] = -np.inf
@@ -304,9 +303,9 @@ def closest_faces(
     return face, np.sqrt(distance)
 
 
-@driver
-def _closest_faces(tree, points, hint, trust, face, distance):
-    for k in prange(-(-points.shape[0] // _POINTS)):
+@threaded(lambda tree, points, *_: -(-len(points) // _POINTS))
+def _closest_faces(span, tree, points, hint, trust, face, distance):
+    for k in range(span[0], span[1]):
         stack = np.empty((2, STACK), np.int64)
         last = np.int64(0)
         for i in range(_POINTS * k, min(_POINTS * k + _POINTS, points.shape[0])):

@@ -106,7 +106,7 @@ def install() -> None:
         function = FunctionType(self.py_func.__code__, scope, self.py_func.__name__)
         return lambda *args: plain(function(*(strict(a) for a in args)))
 
-    _jit.kernel.serial = _jit.kernel.parallel = property(run)
+    _jit.kernel.compiled = property(run)
 
 
 def all_modules() -> list[ModuleType]:

@@ -163,7 +163,6 @@ def test_every_kernel_is_the_same_in_any_order(monkeypatch):
             assert_same_bits(packed[0], one)
         current = packed[0]
     unused = {one.__name__ for one in kernels(_jit._Threaded)} - ORDERED
-    unused |= {one.__name__ for one in kernels(_jit.driver) if "parallel" not in vars(one)}
     assert not unused, "kernels that this test does not reach"
 
 
