@@ -11,6 +11,7 @@ No ``fastmath``: results decide topology and must not depend on how a loop was v
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import sys
 from collections.abc import Callable, Iterator
@@ -239,36 +240,63 @@ def _feed(digest: Any, code: CodeType, scope: dict[str, Any], seen: set[CodeType
             digest.update(value.tobytes())
 
 
-# -- the line that explains a slow first call -------------------------------------------------
+# -- what happens while a slow first call compiles -----------------------------------------------
 
 
-class _Notice(event.Listener):
-    """Prints one line when Numba really compiles one of our kernels (not when it loads a cache)."""
+class _Watch(event.Listener):
+    """Watches Numba compile our kernels (not load them from its cache).
+
+    Prints one line, where a call asked for that. Pauses the garbage collector meanwhile: a compilation
+    makes millions of objects that live until it ends, and looking at them again and again takes a fifth
+    of the time.
+    """
 
     def __init__(self) -> None:
+        self.asked = 0
         self.printed = False
+        self.depth = 0
+        self.paused = False
 
     def on_start(self, event: Any) -> None:
-        dispatcher = (event.data or {}).get("dispatcher")
-        module = getattr(getattr(dispatcher, "py_func", None), "__module__", "")
-        if self.printed or not module.startswith("remeshvec"):
+        if not _is_ours(event):
             return
-        self.printed = True
-        print(
-            "remeshvec: compiling kernels for this machine (once, about 25 s; then cached)",
-            file=sys.stderr,
-            flush=True,
-        )
+        self.depth += 1
+        if self.depth == 1 and gc.isenabled():
+            self.paused = True
+            gc.disable()
+        if self.asked and not self.printed:
+            self.printed = True
+            print(
+                "remeshvec: compiling kernels for this machine (once, about 20 s; then cached)",
+                file=sys.stderr,
+                flush=True,
+            )
 
     def on_end(self, event: Any) -> None:
-        """Nothing to do: the line is printed at the start."""
+        if not _is_ours(event):
+            return
+        self.depth -= 1
+        if self.depth == 0 and self.paused:
+            self.paused = False
+            gc.enable()
 
 
-_notice = _Notice()
+def _is_ours(event: Any) -> bool:
+    """Tell whether it is one of our kernels; Numba compiles one at a time, and its helpers within."""
+    dispatcher = (event.data or {}).get("dispatcher")
+    module = getattr(getattr(dispatcher, "py_func", None), "__module__", None) or ""
+    return module.startswith("remeshvec")
+
+
+_watch = _Watch()
+event.register("numba:compile", _watch)
 
 
 @contextmanager
 def compile_notice() -> Iterator[None]:
     """Say in one line what is happening if the code inside has to compile."""
-    with event.install_listener("numba:compile", _notice):
+    _watch.asked += 1
+    try:
         yield
+    finally:
+        _watch.asked -= 1
