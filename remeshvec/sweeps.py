@@ -267,10 +267,9 @@ class Sweeps:
             return mesh, blocks
         n_faces = mesh.origin.size // 3
         with self.watch.time("collapse"):
-            # Only where this sweep made holes: to count them is a pass over all faces. What the guard
-            # has seen must keep its numbers.
-            made_holes = 8 * self.counts[-1]["collapse"] > n_faces and self.guard is None
-            if made_holes and np.count_nonzero(mesh.origin[::3] == DEAD) > _SPARSE * n_faces:
+            # What the guard has seen must keep its numbers.
+            gone = 0 if flags is None else flags.n_gone + 2 * self.counts[-1]["collapse"]
+            if gone > _SPARSE * n_faces and self.guard is None:
                 mesh = compact(mesh, blocks, parallel, ROOM)
                 blocks = make_blocks(mesh)
                 parallel = self.is_parallel(mesh.origin.size // 3)
