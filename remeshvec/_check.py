@@ -69,14 +69,15 @@ def as_faces(F: ArrayLike, n_vertices: int) -> NDArray[np.int64]:
         array = array.astype(np.int64)
     if array.dtype.kind not in "iu":
         raise MeshInputError(f"F must hold integer vertex indices; got dtype {array.dtype}")
-    low, high = int(array.min()), int(array.max())
-    if low < 0 or high >= n_vertices:
+    faces = np.ascontiguousarray(array, dtype=np.int64)
+    if faces.view(np.uint64).max() >= n_vertices:  # or negative
+        low, high = int(array.min()), int(array.max())
         bad = np.flatnonzero(((array < 0) | (array >= n_vertices)).any(axis=1))
         raise MeshInputError(
             f"{_which(bad, 'face')} of F name vertices outside 0 to {n_vertices - 1} "
             f"(indices run from {low} to {high}); indices are 0-based"
         )
-    return np.ascontiguousarray(array, dtype=np.int64)
+    return faces
 
 
 def positive_count(value: Any, name: str) -> int:

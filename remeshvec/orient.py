@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ._jit import kernel
 from ._types import NONE, IndexArray
-from .halfedge import following
+from .twins import match_half_edges
 
 __all__ = ["orient_faces"]
 
@@ -24,7 +24,7 @@ def orient_faces(F: IndexArray, n: int) -> tuple[IndexArray, NDArray[np.bool_]]:
 
     In each component (faces connected through edges of exactly two faces) the winding of most of its
     faces stays, or that of its first face where there are as many of both. Edges of three faces and
-    more impose nothing, nor do faces that repeat a corner, which stay as they are.
+    more impose nothing.
 
     A component without orientation, like a Möbius strip, is oriented along a breadth-first tree from
     its first face. The edges that remain inconsistent are those where the two ways around meet: on a
@@ -34,7 +34,7 @@ def orient_faces(F: IndexArray, n: int) -> tuple[IndexArray, NDArray[np.bool_]]:
     Parameters
     ----------
     F : (m, 3) int32
-        Faces, with corners from 0 to n - 1.
+        Faces of three different corners, from 0 to n - 1.
     n : int
         Number of vertices.
 
@@ -46,64 +46,16 @@ def orient_faces(F: IndexArray, n: int) -> tuple[IndexArray, NDArray[np.bool_]]:
         Which faces were flipped.
     """
     corners = np.ascontiguousarray(F).reshape(-1)
-    mate = np.empty(corners.size, np.int32)
+    pairs = match_half_edges(corners, n, False, by_winding=False)
     turned = np.zeros(len(F), np.int8)
-    if _match_pairs(corners, n, mate):
-        _turn_faces(corners, mate, turned)
+    if pairs.found.inconsistent_edges:
+        _turn_faces(corners, pairs.twin, turned)
     flipped = turned == 1
     if not flipped.any():
         return F, flipped
     F = F.copy()
     F[flipped] = F[flipped][:, [0, 2, 1]]
     return F, flipped
-
-
-@kernel
-def _match_pairs(corners, n, mate):
-    """Pair the half-edges of edges with two faces; returns how many pairs run the same way.
-
-    By chains of the edges at one end of each, the end with fewer edges, as in `halfedge`.
-    """
-    uses = np.zeros(n, np.int32)
-    for f in range(corners.size // 3):
-        a, b, c = corners[3 * f], corners[3 * f + 1], corners[3 * f + 2]
-        if a != b and b != c and c != a:
-            uses[a] += 1
-            uses[b] += 1
-            uses[c] += 1
-    chain = np.full(n, NONE, np.int32)
-    after = np.empty(corners.size, np.int32)
-    seen = np.empty(corners.size, np.uint8)
-    inconsistent = 0
-    for f in range(corners.size // 3):
-        a, b, c = corners[3 * f], corners[3 * f + 1], corners[3 * f + 2]
-        is_proper = a != b and b != c and c != a
-        for h in range(3 * f, 3 * f + 3):
-            mate[h] = NONE
-            if not is_proper:
-                continue
-            v = corners[h]
-            w = corners[following(h)]
-            if uses[w] < uses[v] or (uses[w] == uses[v] and w < v):
-                v, w = w, v
-            g = np.int64(chain[v])
-            while g != NONE and corners[g] != w and corners[following(g)] != w:
-                g = np.int64(after[g])
-            if g == NONE:
-                after[h] = chain[v]
-                chain[v] = h
-                seen[h] = 1
-                continue
-            seen[g] = min(seen[g] + 1, 4)
-            if seen[g] == 2:
-                mate[h] = g
-                mate[g] = h
-                inconsistent += corners[g] == corners[h]
-            elif seen[g] == 3:
-                inconsistent -= corners[g] == corners[mate[g]]
-                mate[mate[g]] = NONE
-                mate[g] = NONE
-    return inconsistent
 
 
 @kernel

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from math import floor, log2
-from typing import NamedTuple
+from math import floor, isfinite, log2
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._types import NONE, FloatArray, IndexArray, Mesh
-from .clean import drop_degenerate_faces, drop_duplicate_faces, weld_vertices
+from .clean import count_used, drop_degenerate_faces, drop_duplicate_faces, weld_points
 from .errors import MeshInputError
 from .halfedge import BuildReport, build_mesh, ends_of
-from .order import order_mesh
+from .order import Frame, order_mesh, survey
 from .orient import orient_faces
 
 __all__ = ["Prepared", "prepare"]
@@ -22,7 +22,7 @@ class Prepared(NamedTuple):
     """A mesh ready for the sweeps, in a frame of its own: ``(V - centre) * scale``."""
 
     mesh: Mesh
-    face_source: NDArray[np.intp]  # (m,) input face of every face
+    face_source: NDArray[Any]  # (m,) int, input face of every face
     vertex_source: IndexArray  # (n,) input vertex of every vertex
     same: IndexArray | None  # (n_in,) the input vertex that stands for each; None: itself
     flipped: NDArray[np.bool_] | None  # (m_in,) input faces whose corners 1 and 2 were swapped
@@ -31,116 +31,158 @@ class Prepared(NamedTuple):
     dirt: dict[str, int]
 
 
-def prepare(V: FloatArray, F: NDArray[np.int64], parallel: bool) -> Prepared:
+def prepare(V: FloatArray, F: NDArray[Any], parallel: bool) -> Prepared:
     """Clean, orient, order and connect the input.
 
     Degenerate and duplicate faces go, vertices of the same place are welded where both lie on a
     boundary (closed parts that touch stay apart), faces are turned to the winding of their
     neighbours, edges that no manifold has are cut.
+
+    Parameters
+    ----------
+    V : (n, 3) float64
+        Finite where faces use them.
+    F : (m, 3) int
+        Indices in range.
+    parallel : bool
+        Let threads share the work; the result is the same.
     """
-    dirt: dict[str, int] = {}
-    used = np.zeros(len(V), np.bool_)
-    used[F.ravel()] = True
-    _note(dirt, "unreferenced_vertices", len(V) - int(used.sum()))
-    V, centre, scale = _to_frame(V, V if used.all() else V[used])
-    if not used.all():
-        V[~used] = V[used][0]  # they may lie anywhere and would spoil the order of the others
-    F32 = F.astype(np.int32)
-    source = np.arange(len(F))
-    F32, source = _filter(F32, source, drop_degenerate_faces(F32), dirt, "degenerate_faces")
-    connected = _connect(V, F32, parallel)
-    found = connected.found
-    if found.non_manifold_edges or found.inconsistent_edges or found.doubled_faces:
-        kept = drop_duplicate_faces(F32)
-        if kept is not None:
-            F32, source = _filter(F32, source, kept, dirt, "duplicate_faces")
-            connected = _connect(V, F32, parallel)
-    on_boundary = np.unique(connected.mesh.origin[connected.mesh.twin == NONE])
-    same = None
-    if len(on_boundary):
-        same = weld_vertices(V, np.unique(connected.vertex_source[on_boundary]))
+    V, F = (array if array.flags.behaved else array.copy() for array in (V, F))
+    F32, low, high, n_repeated = survey(V, F, parallel)
+    frame = _make_frame(low, high)
+    faces = _Faces(F32)
+    if n_repeated:
+        faces.note("unreferenced_vertices", len(V) - count_used(faces.F, len(V)))
+        faces.keep(drop_degenerate_faces(faces.F), "degenerate_faces")
+    mesh = _connect(V, faces, frame, parallel)
+    if not n_repeated:
+        faces.note("unreferenced_vertices", len(V) - mesh.n_used)
+    mesh = _drop_duplicates(mesh, V, faces, frame, parallel)
+    same = _weld(mesh, V, frame)
     if same is not None:
-        _note(dirt, "welded_vertices", int((same != np.arange(len(V))).sum()))
-        F32 = same[F32]
-        F32, source = _filter(F32, source, drop_degenerate_faces(F32), dirt, "degenerate_faces")
-        F32, source = _filter(F32, source, drop_duplicate_faces(F32), dirt, "duplicate_faces")
-        connected = _connect(V, F32, parallel)
+        faces.note("welded_vertices", int((same != np.arange(len(V))).sum()))
+        faces.F = same[faces.F]
+        faces.keep(drop_degenerate_faces(faces.F), "degenerate_faces")
+        mesh = _connect(V, faces, frame, parallel)
+        mesh = _drop_duplicates(mesh, V, faces, frame, parallel)
     flipped = None
-    if connected.found.inconsistent_edges or connected.found.non_manifold_edges:
-        F32, turned = orient_faces(F32, len(V))
+    if mesh.found.inconsistent_edges or mesh.found.non_manifold_edges:
+        faces.F, turned = orient_faces(faces.F, len(V))
         if turned.any():
-            _note(dirt, "flipped_faces", int(turned.sum()))
+            faces.note("flipped_faces", int(turned.sum()))
             flipped = np.zeros(len(F), np.bool_)
-            flipped[source[turned]] = True
-            connected = _connect(V, F32, parallel)
-    _note(dirt, "non_manifold_edges", connected.found.non_manifold_edges)
-    _note(dirt, "inconsistent_edges", connected.found.inconsistent_edges)
-    if connected.found.pinched_vertices:
-        _note(dirt, "pinched_vertices", _count_pinched(connected))
+            flipped[turned if faces.source is None else faces.source[turned]] = True
+            mesh = _connect(V, faces, frame, parallel)
+    faces.note("non_manifold_edges", mesh.found.non_manifold_edges)
+    faces.note("inconsistent_edges", mesh.found.inconsistent_edges)
+    if mesh.found.pinched_vertices:
+        faces.note("pinched_vertices", _count_pinched(mesh))
+    face_source = mesh.face_source
+    if faces.source is not None:
+        face_source = faces.source[face_source]
     return Prepared(
-        connected.mesh, source[connected.face_source], connected.vertex_source, same, flipped,
-        centre, scale, dirt,
+        mesh.mesh, face_source, mesh.vertex_source, same, flipped, frame.centre, frame.scale,
+        faces.dirt,
     )  # fmt: skip
+
+
+class _Faces:
+    """The faces that are left of the input, and what was found on the way."""
+
+    def __init__(self, F: IndexArray) -> None:
+        self.F = F
+        self.source: IndexArray | None = None  # (m,) input face of each; None: itself
+        self.dirt: dict[str, int] = {}
+
+    def keep(self, kept: NDArray[np.intp] | None, name: str) -> None:
+        """Keep some faces, or all, and say why."""
+        if kept is None:
+            return
+        self.note(name, len(self.F) - len(kept))
+        self.F = self.F[kept]
+        self.source = kept.astype(np.int32) if self.source is None else self.source[kept]
+
+    def note(self, name: str, count: int) -> None:
+        """Count dirt."""
+        if count:
+            self.dirt[name] = self.dirt.get(name, 0) + count
 
 
 class _Connected(NamedTuple):
     mesh: Mesh
     face_source: IndexArray
     vertex_source: IndexArray
+    n_used: int  # vertices that faces use
     found: BuildReport
 
 
-def _connect(V: FloatArray, F: NDArray[np.int32], parallel: bool) -> _Connected:
-    if not len(F):
+def _connect(V: FloatArray, faces: _Faces, frame: Frame, parallel: bool) -> _Connected:
+    if not len(faces.F):
         raise MeshInputError("no face of F has three different corners")
-    ordered = order_mesh(V, F, parallel)
-    mesh, found, source = build_mesh(ordered.X, ordered.F)
-    return _Connected(mesh, ordered.face_source, ordered.vertex_source[source], found)
+    ordered = order_mesh(V, faces.F, parallel, frame)
+    mesh, found, source = build_mesh(ordered.X, ordered.F, parallel, owned=True)
+    vertex_source = ordered.vertex_source
+    if len(source) > len(vertex_source):
+        vertex_source = vertex_source[source]
+    return _Connected(mesh, ordered.face_source, vertex_source, len(ordered.X), found)
+
+
+def _drop_duplicates(
+    connected: _Connected, V: FloatArray, faces: _Faces, frame: Frame, parallel: bool
+) -> _Connected:
+    """Drop duplicate faces, if any, and connect the others."""
+    found = connected.found
+    if not (found.non_manifold_edges or found.inconsistent_edges or found.doubled_faces):
+        return connected
+    kept = drop_duplicate_faces(faces.F, connected.face_source[_may_be_double(connected.mesh.twin)])
+    if kept is None:
+        return connected
+    faces.keep(kept, "duplicate_faces")
+    return _connect(V, faces, frame, parallel)
+
+
+def _may_be_double(twin: IndexArray) -> NDArray[np.bool_]:
+    """Faces without two different neighbours: the edges of duplicates are cut or join the two."""
+    a, b, c = (twin.reshape(-1, 3) // 3).T
+    most = np.maximum(np.maximum(a, b), c)
+    return ((a == most) | (a < 0)) & ((b == most) | (b < 0)) & ((c == most) | (c < 0))
+
+
+def _weld(connected: _Connected, V: FloatArray, frame: Frame) -> IndexArray | None:
+    """Map vertices of the boundary in one place to one of them; None where there are none."""
+    on_boundary = np.flatnonzero(connected.mesh.kind)
+    if not len(on_boundary):
+        return None
+    candidates = np.unique(connected.vertex_source[on_boundary])
+    points = (V[candidates] - frame.centre) * frame.scale
+    return weld_points(points, candidates, len(V))
 
 
 def _count_pinched(connected: _Connected) -> int:
     """Count vertices that hold several fans, but for the ends of edges that were cut."""
-    mesh, source = connected.mesh, connected.vertex_source
-    h = np.flatnonzero(mesh.twin == NONE)
-    ends = source[ends_of(mesh.origin, h)]
-    edges, count = np.unique(np.sort(ends, axis=0), axis=1, return_counts=True)
-    vertices, fans = np.unique(source, return_counts=True)
-    return len(np.setdiff1d(vertices[fans > 1], edges[:, count > 1]))
+    mesh, source, found = connected.mesh, connected.vertex_source, connected.found
+    pinched = np.unique(source[connected.n_used :])
+    if found.non_manifold_edges or found.inconsistent_edges:
+        h = np.flatnonzero(mesh.twin == NONE)
+        ends = np.sort(source[ends_of(mesh.origin, h)], axis=0)
+        edges, count = np.unique(ends, axis=1, return_counts=True)
+        pinched = np.setdiff1d(pinched, edges[:, count > 1])
+    return len(pinched)
 
 
-def _filter(
-    F: NDArray[np.int32],
-    source: NDArray[np.intp],
-    kept: NDArray[np.intp] | None,
-    dirt: dict[str, int],
-    name: str,
-) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
-    if kept is None:
-        return F, source
-    _note(dirt, name, len(F) - len(kept))
-    return F[kept], source[kept]
-
-
-def _note(dirt: dict[str, int], name: str, count: int) -> None:
-    if count:
-        dirt[name] = dirt.get(name, 0) + count
-
-
-def _to_frame(V: FloatArray, used: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+def _make_frame(low: FloatArray, high: FloatArray) -> Frame:
     """Scale to an extent of 1 to 2 and, far from the origin, centre.
 
     A power of two changes no bit of a mantissa, so the frame costs no precision; it keeps squares
     of squares of lengths in range for any unit.
     """
-    low, high = used.min(axis=0), used.max(axis=0)
-    with np.errstate(over="ignore"):
-        extent = float((high - low).max())
+    corners = list(zip(low.tolist(), high.tolist(), strict=True))
+    extent = max(b - a for a, b in corners)
     if not extent > 0.0:
         raise MeshInputError("all vertices of V lie in one place: there is no surface to remesh")
-    if not np.isfinite(extent):
+    if not isfinite(extent):
         raise MeshInputError("the extent of V exceeds the range of float64; scale it down")
-    middle = 0.5 * low + 0.5 * high
-    centre = middle if np.abs(middle).max() > 4.0 * extent else np.zeros(3)
-    scale = 2.0 ** min(1000, -floor(log2(extent)))
-    with np.errstate(invalid="ignore", over="ignore"):  # vertices that no face uses may be anything
-        return np.ascontiguousarray((V - centre) * scale), centre, scale
+    middle = [0.5 * a + 0.5 * b for a, b in corners]
+    is_far = max(abs(x) for x in middle) > 4.0 * extent
+    centre = np.array(middle) if is_far else np.zeros(3)
+    return Frame(low, high, centre, 2.0 ** min(1000, -floor(log2(extent))))

@@ -15,7 +15,7 @@ PACKAGE = ROOT / "remeshvec"
 LEVELS = {
     0: ["_types", "_jit", "_threads", "_check", "errors"],
     1: ["geometry"],
-    2: ["halfedge", "order", "orient", "edge_sets", "bvh", "curves", "polyline", "clean"],
+    2: ["halfedge", "twins", "order", "orient", "edge_sets", "bvh", "curves", "polyline", "clean"],
     3: [
         "quality", "distance", "features", "creases", "_chains", "_echo", "corners", "sizing",
         "curvature", "gradation",
@@ -36,7 +36,8 @@ LEVELS = {
 }  # fmt: skip
 SIDEWAYS = {
     ("_check", "errors"), ("_jit", "_threads"),
-    ("bvh", "halfedge"), ("curves", "halfedge"), ("orient", "halfedge"), ("polyline", "halfedge"),
+    ("halfedge", "twins"), ("twins", "order"),
+    ("bvh", "halfedge"), ("curves", "halfedge"), ("orient", "twins"), ("polyline", "halfedge"),
     ("creases", "_chains"), ("creases", "_echo"), ("sizing", "curvature"), ("sizing", "gradation"),
     ("operations.collapse", "operations.guards"), ("operations.siblings", "operations.collapse"),
     ("operations.bisect", "operations.measure"), ("operations.collapse", "operations.measure"),
@@ -160,18 +161,18 @@ def test_numba_flags_live_in_one_module():
         if name in ("_jit", "_threads"):  # these ask Numba how many threads there are
             continue
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and node.module == "numba":
-                assert {alias.name for alias in node.names} == {"prange"}, name
+            if isinstance(node, ast.ImportFrom) and node.module:
+                assert not node.module.startswith("numba"), name
             if isinstance(node, ast.Import):
                 assert not any(alias.name.startswith("numba") for alias in node.names), name
 
 
 def test_kernels_never_raise():
-    """A `raise` inside `prange` silently makes the loop serial."""
+    """Kernels return a status: who calls them knows what to say."""
     for name, path in ALL.items():
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.FunctionDef) and any(
-                isinstance(d, ast.Name) and d.id in ("inlined", "kernel", "driver")
+                getattr(getattr(d, "func", d), "id", "") in ("inlined", "kernel", "threaded")
                 for d in node.decorator_list
             ):
                 bad = [n for n in ast.walk(node) if isinstance(n, ast.Raise | ast.Assert | ast.Try)]
