@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._jit import inlined, kernel
 from ._types import NONE, FloatArray, IndexArray
+from .halfedge import following
 
 __all__ = ["BORDER", "CLEAN", "HARD", "STRONG", "SURE", "WEAK", "count_chains", "keep_chains"]
 
@@ -40,21 +41,11 @@ ROUNDS = 4
 SLACK = 1.0 - 1e-9
 
 
-class Candidates(NamedTuple):
-    """Candidate edges, k of them with n ends in all."""
-
-    end: IndexArray  # (k, 2) numbers of the vertices at both ends
-    unit: FloatArray  # (k, 3) from the first end to the second
-    length: FloatArray  # (k,)
-    targets: FloatArray  # (k,) length in target lengths, or in mean edges where these are longer
-    rank: NDArray[np.uint8]  # (k,) class
-
-
 def keep_chains(
     X: FloatArray,
     origin: IndexArray,
     edges: NDArray[np.int64],
-    rank: NDArray[np.uint8],
+    rank: NDArray[np.int8],
     mean_edge: float,
 ) -> NDArray[np.bool_]:
     """Tell which candidate edges are creases.
@@ -72,7 +63,7 @@ def keep_chains(
     origin : (3 m,) int32
     edges : (k,) int64
         One half-edge of every candidate.
-    rank : (k,) uint8
+    rank : (k,) int8
         ``WEAK``, ``STRONG``, ``SURE``, ``CLEAN``, ``HARD`` or ``BORDER``.
     mean_edge : float
         Of the whole mesh.
@@ -81,21 +72,8 @@ def keep_chains(
     -------
     (k,) bool
     """
-    every = _candidates(X, origin, edges, rank, mean_edge)
-    kept = rank == BORDER
-    # The boundary lends an end to the others, neither length nor certainty: else every turn beside a
-    # noisy one would stay.
-    is_anchor = np.zeros(every.end.max(initial=-1) + 1, np.bool_)
-    is_anchor[every.end[kept]] = True
-    alive = np.flatnonzero(~kept)
-    for _ in range(ROUNDS):
-        found = _selected(every, alive)
-        keep = _lasting_chains(found, is_anchor)
-        alive = alive[keep]
-        if keep.all():
-            break
-    found = _selected(every, alive)
-    kept[alive[_lasting_components(found, is_anchor)]] = True
+    kept = np.zeros(len(edges), np.bool_)
+    _sift(X, origin, edges, rank, mean_edge, _numbers(X), ROUNDS, kept)
     return kept
 
 
@@ -103,114 +81,125 @@ def count_chains(
     X: FloatArray, origin: IndexArray, twin: IndexArray, edges: NDArray[np.int64]
 ) -> int:
     """Count the chains among feature edges, those that lie on the boundary alone left out."""
-    found = _candidates(X, origin, edges, np.full(len(edges), HARD, np.uint8), 1.0)
-    return len(np.unique(_chains(found)[twin[edges] != NONE]))
+    counts = twin[edges] != NONE
+    rank = np.full(len(edges), HARD, np.int8)
+    return int(_sift(X, origin, edges, rank, 1.0, _numbers(X), 0, counts))
 
 
-def _candidates(
-    X: FloatArray,
-    origin: IndexArray,
-    edges: NDArray[np.int64],
-    rank: NDArray[np.uint8],
-    mean_edge: float,
-) -> Candidates:
-    following = np.where(edges % 3 == 2, edges - 2, edges + 1)
-    ends = np.stack([origin[edges], origin[following]], axis=1)
-    vector = X[ends[:, 1], :3] - X[ends[:, 0], :3]
-    length = np.sqrt((vector * vector).sum(axis=1))
-    target = 0.5 * (X[ends[:, 0], 3] + X[ends[:, 1], 3])
-    unit = vector / np.where(length > 0.0, length, 1.0)[:, None]
-    number = np.unique(ends, return_inverse=True)[1].reshape(ends.shape).astype(np.int32)
-    return Candidates(number, unit, length, length / np.maximum(target, mean_edge), rank)
-
-
-def _selected(every: Candidates, alive: NDArray[np.intp]) -> Candidates:
-    return Candidates(
-        every.end[alive],
-        every.unit[alive],
-        every.length[alive],
-        every.targets[alive],
-        every.rank[alive],
-    )
-
-
-def _lasting_chains(found: Candidates, is_anchor: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell for each edge whether its chain stays."""
-    chain = _chains(found)
-    is_long = np.bincount(chain, found.targets) >= CHAIN_LENGTH * SLACK
-    keep = is_long & _has(found, chain, STRONG)
-    keep |= _is_mostly(found, chain, SURE) & _has_no_loose_end(found, chain, is_anchor)
-    keep |= _is_mostly(found, chain, CLEAN, CLEAN_EDGES)
-    keep |= _has(found, chain, HARD)
-    return keep[chain]
-
-
-def _lasting_components(found: Candidates, is_anchor: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell for each edge whether its component stays."""
-    first, second = np.ascontiguousarray(found.end.T)
-    root = np.arange(found.end.max(initial=0) + 1, dtype=np.int32)
-    _join(root, first, second)
-    component = root[first]
-    keep = np.bincount(component, found.targets) >= COMPONENT_LENGTH * SLACK
-    from_border = np.bincount(component, is_anchor[found.end].any(axis=1)) > 0.0
-    is_long = np.bincount(component, found.targets) >= CHAIN_LENGTH * SLACK
-    keep |= from_border & is_long & _is_mostly(found, component, SURE)
-    is_tied = _has_no_loose_end(found, component, is_anchor)
-    keep |= _is_mostly(found, component, SURE, CLOSED_EDGES) & is_tied
-    keep |= _is_mostly(found, component, CLEAN, CLEAN_EDGES)
-    keep |= _has(found, component, HARD)
-    return keep[component]
-
-
-def _has(found: Candidates, group: IndexArray, rank: int) -> NDArray[np.bool_]:
-    """Tell for each group whether one of its edges is of this class."""
-    return np.bincount(group, found.rank >= rank) > 0.0
-
-
-def _is_mostly(
-    found: Candidates, group: IndexArray, rank: int, edges: int = 1
-) -> NDArray[np.bool_]:
-    """Tell for each group whether half of its length, and so many edges, are of this class."""
-    is_such = found.rank >= rank
-    enough = np.bincount(group, is_such) >= edges
-    half = 0.5 * SLACK * np.bincount(group, found.length)
-    return enough & (np.bincount(group, found.length * is_such) >= half)
-
-
-def _has_no_loose_end(
-    found: Candidates, group: IndexArray, is_anchor: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """Tell for each group whether all its edges end at other candidates or on the boundary."""
-    is_loose = (np.bincount(found.end.ravel(), minlength=len(is_anchor)) == 1) & ~is_anchor
-    return np.bincount(group, is_loose[found.end].any(axis=1)) == 0.0
-
-
-def _chains(found: Candidates) -> IndexArray:
-    """Pair and link; returns for each edge the number of the first edge of its chain."""
-    partner = np.full(2 * len(found.end), NONE, np.int32)
-    _pair(found.end, found.unit, partner)
-    linked = np.flatnonzero(partner != NONE).astype(np.int32)
-    root = np.arange(len(found.end), dtype=np.int32)
-    _join(root, linked // 2, partner[linked] // 2)
-    return root
+def _numbers(X: FloatArray) -> IndexArray:
+    """Room for numbers of the vertices at candidates."""
+    return np.full(len(X), NONE, np.int32)
 
 
 @kernel
-def _pair(end, unit, partner):
-    """Pair the ends of edges (number 2 k or 2 k + 1) that meet at a vertex, straightest first."""
-    n = 0
-    for k in range(len(end)):
-        n = max(n, end[k, 0] + 1, end[k, 1] + 1)
-    head = np.full(n, NONE, np.int32)
-    size = np.zeros(n, np.int32)
-    after = np.empty(2 * len(end), np.int32)
-    for i in range(2 * len(end)):
-        v = end[i // 2, i % 2]
-        after[i] = head[v]
-        head[v] = i
-        size[v] += 1
-    for v in range(n):
-        if size[v] > MAX_ENDS:
+def _sift(X, origin, edges, rank, mean_edge, number, rounds, kept):
+    """Mark the candidates that are kept; with no rounds, count the chains that have a marked edge."""
+    n = edges.size
+    end = np.empty((n, 2), np.int32)
+    unit = np.empty((n, 3))
+    length = np.empty((n, 2))  # in the units of X, and in target lengths
+    n_vertices = _describe(X, origin, edges, mean_edge, number, end, unit, length)
+    is_anchor = np.zeros(n_vertices, np.bool_)
+    alive = np.empty(n, np.int32)
+    n_alive = 0
+    for k in range(n):
+        if rank[k] == BORDER:
+            # It lends an end to the others, neither length nor certainty: else every turn beside a
+            # noisy one would stay.
+            kept[k] = True
+            is_anchor[end[k, 0]] = True
+            is_anchor[end[k, 1]] = True
+        else:
+            alive[n_alive] = k
+            n_alive += 1
+    lists = np.empty((2, n_vertices), np.int32)
+    links = np.empty((2, 2 * n), np.int32)
+    n_groups = max(n, n_vertices)
+    root = np.empty(n_groups, np.int32)
+    sums = np.empty((n_groups, 4))
+    count = np.empty((n_groups, 2), np.int32)
+    traits = np.empty(n_groups, np.uint8)
+    groups = sums, count, traits
+    is_settled = False
+    for turn in range(rounds + 1):
+        by_vertex = rounds > 0 and (is_settled or turn == rounds)  # what is connected, at the end
+        _list_ends(end, alive, n_alive, lists, links)
+        for g in range(n_groups):
+            root[g] = g
+        if by_vertex:
+            for i in range(n_alive):
+                _join(root, end[alive[i], 0], end[alive[i], 1])
+        else:
+            _pair(unit, lists, links, root)
+        for g in range(n_groups):
+            root[g] = root[root[g]]
+        if rounds == 0:
+            return _count_marked(root, kept, traits)
+        _add_up(alive, n_alive, by_vertex, root, end, length, rank, lists[1], is_anchor, groups)
+        before = n_alive
+        n_alive = 0
+        for i in range(before):
+            k = alive[i]
+            if by_vertex:
+                kept[k] = _component_stays(groups, root[end[k, 0]])
+            elif _chain_stays(groups, root[k]):
+                alive[n_alive] = k
+                n_alive += 1
+        if by_vertex:
+            break
+        is_settled = n_alive == before
+    return 0
+
+
+@inlined
+def _describe(X, origin, edges, mean_edge, number, end, unit, length):
+    """Measure all edges and number their ends; returns the number of vertices."""
+    count = 0
+    for k in range(edges.size):
+        h = edges[k]
+        a, b = origin[h], origin[following(h)]
+        for side in range(2):
+            v = b if side else a
+            if number[v] == NONE:
+                number[v] = count
+                count += 1
+            end[k, side] = number[v]
+        x, y, z = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
+        norm = sqrt(x * x + y * y + z * z)
+        length[k, 0] = norm
+        length[k, 1] = norm / max(0.5 * (X[a, 3] + X[b, 3]), mean_edge)
+        if norm > 0.0:
+            x, y, z = x / norm, y / norm, z / norm
+        unit[k, 0] = x
+        unit[k, 1] = y
+        unit[k, 2] = z
+    return count
+
+
+@inlined
+def _list_ends(end, alive, n_alive, lists, links):
+    """List the ends of edges (number 2 k or 2 k + 1) that meet at each vertex; none has a partner."""
+    head, size = lists
+    after, partner = links
+    head[:] = NONE
+    size[:] = 0
+    for i in range(n_alive):
+        for side in range(2):
+            e = 2 * alive[i] + side
+            v = end[alive[i], side]
+            after[e] = head[v]
+            head[v] = e
+            size[v] += 1
+            partner[e] = NONE
+
+
+@inlined
+def _pair(unit, lists, links, root):
+    """Pair the ends that meet at a vertex, straightest first, and join their edges."""
+    head, size = lists
+    after, partner = links
+    for v in range(head.size):
+        if not 1 < size[v] <= MAX_ENDS:
             continue
         while True:
             i, j = _straightest(unit, after, partner, head[v])
@@ -218,14 +207,15 @@ def _pair(end, unit, partner):
                 break
             partner[i] = j
             partner[j] = i
+            _join(root, i // 2, j // 2)
 
 
 @inlined
 def _straightest(unit, after, partner, first):
     """Find the two free ends of a list that bend least, -1 where none bend by 45 degrees at most."""
     best = BEND - 1e-8
-    best_i = NONE
-    best_j = NONE
+    best_i = np.int32(NONE)
+    best_j = np.int32(NONE)
     i = first
     while i != NONE:
         j = after[i]
@@ -243,22 +233,96 @@ def _straightest(unit, after, partner, first):
     return best_i, best_j
 
 
-@kernel
-def _join(root, a, b):
-    """Join numbers a[i] and b[i]; leaves in ``root`` the smallest number of each set."""
-    for i in range(len(a)):
-        p, q = a[i], b[i]
-        while root[p] != p:
-            p = root[p]
-        while root[q] != q:
-            q = root[q]
-        root[max(p, q)] = min(p, q)
-        # Halving the paths afterwards keeps the trees flat.
-        r = min(p, q)
-        p, q = a[i], b[i]
-        while root[p] > r:
-            root[p], p = r, root[p]
-        while root[q] > r:
-            root[q], q = r, root[q]
-    for i in range(len(root)):
-        root[i] = root[root[i]]
+@inlined
+def _find(root, p):
+    """Return the smallest number of a set; halves the path on the way."""
+    while root[p] != p:
+        root[p] = root[root[p]]
+        p = root[p]
+    return p
+
+
+@inlined
+def _join(root, p, q):
+    p = _find(root, p)
+    q = _find(root, q)
+    root[max(p, q)] = min(p, q)
+
+
+@inlined
+def _count_marked(root, is_marked, is_counted):
+    """Count the sets that have a marked edge."""
+    count = 0
+    is_counted[:] = 0
+    for k in range(is_marked.size):
+        if is_marked[k] and not is_counted[root[k]]:
+            is_counted[root[k]] = 1
+            count += 1
+    return count
+
+
+# What a group of edges has.
+_A_STRONG = 1
+_A_HARD = 2
+_A_LOOSE_END = 4
+_AN_ANCHOR = 8
+
+
+@inlined
+def _add_up(alive, n_alive, by_vertex, root, end, length, rank, size, is_anchor, groups):
+    """Add up lengths and traits of the edges of each group."""
+    sums, count, traits = groups
+    for i in range(n_alive):
+        k = alive[i]
+        g = root[end[k, 0]] if by_vertex else root[k]
+        for j in range(4):
+            sums[g, j] = 0.0
+        count[g, 0] = count[g, 1] = 0
+        traits[g] = 0
+    for i in range(n_alive):
+        k = alive[i]
+        g = root[end[k, 0]] if by_vertex else root[k]
+        sums[g, 0] += length[k, 1]
+        sums[g, 1] += length[k, 0]
+        if rank[k] >= SURE:
+            sums[g, 2] += length[k, 0]
+            count[g, 0] += 1
+        if rank[k] >= CLEAN:
+            sums[g, 3] += length[k, 0]
+            count[g, 1] += 1
+        has = _A_STRONG * (rank[k] >= STRONG) + _A_HARD * (rank[k] >= HARD)
+        for side in range(2):
+            v = end[k, side]
+            if is_anchor[v]:
+                has |= _AN_ANCHOR
+            elif size[v] == 1:
+                has |= _A_LOOSE_END
+        traits[g] |= has
+
+
+@inlined
+def _chain_stays(groups, g):
+    sums, count, traits = groups
+    half = 0.5 * SLACK * sums[g, 1]
+    is_long = sums[g, 0] >= CHAIN_LENGTH * SLACK
+    return (
+        (is_long and traits[g] & _A_STRONG != 0)
+        or (count[g, 0] > 0 and sums[g, 2] >= half and traits[g] & _A_LOOSE_END == 0)
+        or (count[g, 1] >= CLEAN_EDGES and sums[g, 3] >= half)
+        or traits[g] & _A_HARD != 0
+    )
+
+
+@inlined
+def _component_stays(groups, g):
+    sums, count, traits = groups
+    half = 0.5 * SLACK * sums[g, 1]
+    is_sure = count[g, 0] > 0 and sums[g, 2] >= half
+    is_long = sums[g, 0] >= CHAIN_LENGTH * SLACK
+    return (
+        sums[g, 0] >= COMPONENT_LENGTH * SLACK
+        or (is_sure and is_long and traits[g] & _AN_ANCHOR != 0)
+        or (is_sure and count[g, 0] >= CLOSED_EDGES and traits[g] & _A_LOOSE_END == 0)
+        or (count[g, 1] >= CLEAN_EDGES and sums[g, 3] >= half)
+        or traits[g] & _A_HARD != 0
+    )

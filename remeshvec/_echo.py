@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from math import acos, cos, sqrt
+from math import cos, sqrt
 
 import numpy as np
 
 from ._jit import inlined
 from ._types import NONE
-from .geometry import distance_squared, face_vector
+from .geometry import distance_squared
 from .halfedge import following, previous
+from .turns import face_cosine
 
-__all__ = ["echoes_beside", "face_cosine"]
+__all__ = ["echo_cosines", "echoes_beside"]
 
 # An echo turns by at least this share of our edge: with 0.6 a quarter more is kept on organic
 # shapes, and a fillet of two segments has a crease in its middle. What turns by this multiple of it
@@ -30,58 +31,39 @@ MAX_STEPS = 24
 
 
 @inlined
-def face_cosine(normals, f, g):
-    """Cosine of the angle between two faces."""
-    return (
-        normals[f, 0] * normals[g, 0]
-        + normals[f, 1] * normals[g, 1]
-        + normals[f, 2] * normals[g, 2]
-    )
-
-
-@inlined
-def _is_convex(X, origin, normals, h, t):
-    """Tell whether the surface bends away from its normals across the edge of ``h`` and its twin."""
+def _edge(X, origin, h):
+    """Vector along a half-edge, and its length."""
     a, b = origin[h], origin[following(h)]
-    f, g = h // 3, t // 3
-    x = normals[f, 1] * normals[g, 2] - normals[f, 2] * normals[g, 1]
-    y = normals[f, 2] * normals[g, 0] - normals[f, 0] * normals[g, 2]
-    z = normals[f, 0] * normals[g, 1] - normals[f, 1] * normals[g, 0]
-    return x * (X[b, 0] - X[a, 0]) + y * (X[b, 1] - X[a, 1]) + z * (X[b, 2] - X[a, 2]) > 0.0
-
-
-@inlined
-def _unfolded_apex(X, origin, h):
-    """Third corner of the face of ``h``, from its origin: along the edge, and across; the length too."""
-    a, b, c = origin[h], origin[following(h)], origin[previous(h)]
-    squared = distance_squared(X, a, b)
-    if squared == 0.0:
-        return 0.0, sqrt(distance_squared(X, a, c)), 0.0
-    length = sqrt(squared)
-    along = 0.0
-    for i in range(3):
-        along += (X[c, i] - X[a, i]) * (X[b, i] - X[a, i])
-    nx, ny, nz = face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
-    return along / length, sqrt(nx * nx + ny * ny + nz * nz) / length, length
-
-
-@inlined
-def _direction(X, origin, normals, h, u, w):
-    """Vector in space that goes ``u`` along half-edge ``h`` and ``w`` into its face."""
-    a, b = origin[h], origin[following(h)]
-    f = h // 3
     x, y, z = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
-    length = sqrt(x * x + y * y + z * z)
-    if length > 0.0:
-        x, y, z = x / length, y / length, z / length
+    return x, y, z, sqrt(x * x + y * y + z * z)
+
+
+@inlined
+def _is_convex(normals, f, g, x, y, z):
+    """Tell whether the surface bends away from its normals from face f on the left of an edge to g."""
+    nx = normals[f, 1] * normals[g, 2] - normals[f, 2] * normals[g, 1]
+    ny = normals[f, 2] * normals[g, 0] - normals[f, 0] * normals[g, 2]
+    nz = normals[f, 0] * normals[g, 1] - normals[f, 1] * normals[g, 0]
+    return nx * x + ny * y + nz * z > 0.0
+
+
+@inlined
+def _unfolded_apex(X, origin, h, x, y, z, length):
+    """Third corner of the face of ``h``, from its origin: along the edge (x, y, z), and across."""
+    a, c = origin[h], origin[previous(h)]
+    if length == 0.0:
+        return 0.0, sqrt(distance_squared(X, a, c))
+    wx, wy, wz = X[c, 0] - X[a, 0], X[c, 1] - X[a, 1], X[c, 2] - X[a, 2]
+    nx, ny, nz = y * wz - z * wy, z * wx - x * wz, x * wy - y * wx
+    along = wx * x + wy * y + wz * z
+    return along / length, sqrt(nx * nx + ny * ny + nz * nz) / length
+
+
+@inlined
+def _across(normals, f, x, y, z):
+    """Vector into a face, perpendicular to its edge (x, y, z) and as long."""
     nx, ny, nz = normals[f, 0], normals[f, 1], normals[f, 2]
-    return (
-        u * x + w * (ny * z - nz * y),
-        u * y + w * (nz * x - nx * z),
-        u * z + w * (nx * y - ny * x),
-    )
+    return ny * z - nz * y, nz * x - nx * z, nx * y - ny * x
 
 
 @inlined
@@ -109,31 +91,37 @@ def _exit(x, y, length, at, u, w):
 
 
 @inlined
-def echoes_beside(X, origin, twin, normals, is_hard, h, reach):
-    """Count how often the turn across ``h`` comes again, straight into its face.
+def echo_cosines(turn):
+    """Cosines between which an edge is an echo of one that turns by so many radians."""
+    return cos(SHARE * turn), cos(min(3.0, MULTIPLE * turn))
+
+
+@inlined
+def echoes_beside(X, origin, twin, normals, is_hard, h, reach, quiet, loud, enough):
+    """Count how often the turn across ``h`` comes again, straight into its face, up to ``enough``.
 
     The walk runs over unfolded faces from the middle of the edge, perpendicular to it, for a length
-    of ``reach``. The first edge that is nearly parallel and turns by a comparable angle decides: it
-    is an echo if it turns to the same side. From there the walk goes on for a second one.
+    of ``reach``. The first edge that is nearly parallel and turns by a comparable angle, with a cosine
+    between ``loud`` and ``quiet``, decides: it is an echo if it turns to the same side. From there the
+    walk goes on for a second one.
 
     Returns
     -------
     echoes : int
-        0, 1 or 2.
     is_cut_short : bool
         Whether the walk ended where the face does, so that there might be more of them.
     """
-    turn = acos(min(1.0, max(-1.0, face_cosine(normals, h // 3, twin[h] // 3))))
-    quiet = cos(SHARE * turn)
-    loud = cos(min(3.0, MULTIPLE * turn))
-    convex = _is_convex(X, origin, normals, h, twin[h])
-    x0, y0, z0 = _direction(X, origin, normals, h, 0.0, 1.0)
+    ex, ey, ez, length = _edge(X, origin, h)
+    f = h // 3
+    convex = _is_convex(normals, f, twin[h] // 3, ex, ey, ez)
+    x0, y0, z0 = _across(normals, f, ex, ey, ez)
+    away = AWAY * length
     echoes = 0
     left = reach
     g = h
     share, u, w = 0.5, 0.0, 1.0
     for _ in range(MAX_STEPS):
-        x, y, length = _unfolded_apex(X, origin, g)
+        x, y = _unfolded_apex(X, origin, g, ex, ey, ez, length)
         is_last, distance, share, dx, dy = _exit(x, y, length, share * length, u, w)
         left -= distance
         if left < 0.0:
@@ -143,19 +131,22 @@ def echoes_beside(X, origin, twin, normals, is_hard, h, reach):
         if t == NONE or is_hard[g]:
             return echoes, True
         u, w = u * dx + w * dy, max(abs(u * dy - w * dx), 1e-9)
-        cosine = face_cosine(normals, g // 3, t // 3)
+        before, f = f, t // 3
+        ex, ey, ez, length = _edge(X, origin, t)
+        cosine = face_cosine(normals, before, f)
         if cosine <= quiet and w >= PARALLEL:
             if cosine <= loud:
                 return echoes, True
-            if _is_convex(X, origin, normals, g, t) != convex:
+            if _is_convex(normals, before, f, -ex, -ey, -ez) != convex:
                 return echoes, False
             echoes += 1
             left = reach
-            if echoes == 2:
+            if echoes == enough:
                 return echoes, False
         g = t
         if echoes == 0:
-            xd, yd, zd = _direction(X, origin, normals, g, u, w)
-            if xd * x0 + yd * y0 + zd * z0 < AWAY:
+            xa, ya, za = _across(normals, f, ex, ey, ez)
+            along = u * (ex * x0 + ey * y0 + ez * z0) + w * (xa * x0 + ya * y0 + za * z0)
+            if not along >= away * length:
                 return echoes, False
     return echoes, False

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ._types import NONE, IndexArray, Mesh
 from .errors import OptionError
+from .halfedge import ends_of
 
-__all__ = ["BOUNDARY_MODES", "Constraints", "Marks", "make_constraints"]
+__all__ = ["BOUNDARY_MODES", "Constraints", "Marks", "edge_keys", "make_constraints"]
 
 BOUNDARY_MODES = ("free", "split", "fixed")
 
@@ -53,47 +54,64 @@ class Constraints:
         same : (n_in,) int32, optional
             The vertex that stands for each of the input, where some were welded.
         """
-        # A vertex that no face uses any more may have any index.
-        n = 1 + max(int(vertex_source.max()), int(self.feature_edges.max(initial=0)))
-        ends = vertex_source[mesh.origin].astype(np.int64).reshape(-1, 3)
-        keys = _edge_keys(ends.ravel(), np.roll(ends, -1, axis=1).ravel(), n)
+        hard = np.zeros(mesh.origin.size, np.bool_)
         edges, vertices = self.feature_edges, self.fixed_vertices
         if same is not None:
-            edges, vertices = same[edges].astype(np.int64), same[vertices]
-        hard = np.zeros(len(keys), np.bool_)
+            edges, vertices = same[edges], same[vertices]
         if len(edges):
-            hard |= np.isin(keys, _edge_keys(edges[:, 0], edges[:, 1], n))
+            hard[_sides(mesh.origin, vertex_source, edges.T)] = True
         if self.labels is not None:
             hard |= _borders(mesh.twin, self.labels[face_source])
-        fixed = np.zeros(max(n, int(vertices.max(initial=0)) + 1), np.bool_)
-        fixed[vertices] = True
-        fixed = fixed[vertex_source]
+        fixed = np.zeros(len(vertex_source), np.bool_)
+        if len(vertices):
+            fixed = np.isin(vertex_source, vertices)
         held = None if self.fixed_faces is None else self.fixed_faces[face_source]
-        frozen = np.zeros(len(keys), np.bool_)
+        frozen = np.zeros(mesh.origin.size, np.bool_)
         if held is not None and held.any():
             frozen |= np.repeat(held, 3)
         else:
             held = None
         if self.boundary != "free":
-            border = _border_edges(mesh.twin, keys)
-            fixed[mesh.origin[border]] = True
-            fixed[mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()[border]] = True
+            border = _border_edges(mesh, vertex_source)
+            fixed[ends_of(mesh.origin, border)] = True
             if self.boundary == "fixed":
-                frozen |= border
+                frozen[border] = True
         if frozen.any():  # all sides of an edge, of two faces or more
-            frozen = np.isin(keys, np.unique(keys[frozen]))
-            fixed[mesh.origin[frozen]] = True
-            fixed[mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()[frozen]] = True
+            ends = vertex_source[ends_of(mesh.origin, np.flatnonzero(frozen))]
+            h = _sides(mesh.origin, vertex_source, ends)
+            frozen[h] = True
+            fixed[ends_of(mesh.origin, h)] = True
         return Marks(hard, held, frozen, fixed)
 
 
-def _border_edges(twin: IndexArray, keys: NDArray[np.int64]) -> BoolArray:
+def _sides(
+    origin: NDArray[Any], vertex_source: NDArray[Any] | None, ends: NDArray[Any]
+) -> NDArray[np.int64]:
+    """Half-edges that run between the same two vertices as any of these (2, k), either way.
+
+    ``vertex_source`` tells which vertices are the same.
+    """
+    n = 1 + int(ends.max())
+    is_end = np.zeros(n, np.bool_)
+    is_end[ends] = True
+    at = origin if vertex_source is None else vertex_source[origin]
+    is_near = is_end[np.minimum(at, n - 1)] & (at < n)
+    h = np.flatnonzero(is_near.reshape(-1, 3) & np.roll(is_near.reshape(-1, 3), -1, axis=1))
+    keys = edge_keys(ends_of(at, h), n)
+    return h[np.isin(keys, edge_keys(ends, n))]
+
+
+def _border_edges(mesh: Mesh, vertex_source: IndexArray) -> NDArray[np.int64]:
     """Half-edges without a twin that have no sibling on another sheet either."""
-    h = np.flatnonzero(twin == NONE)
-    _, place, count = np.unique(keys[h], return_inverse=True, return_counts=True)
-    border = np.zeros(len(twin), np.bool_)
-    border[h[count[place] == 1]] = True
-    return border
+    h = np.flatnonzero(mesh.twin == NONE)
+    keys = edge_keys(vertex_source[ends_of(mesh.origin, h)], 1 + int(vertex_source.max()))
+    _, place, count = np.unique(keys, return_inverse=True, return_counts=True)
+    return np.asarray(h[count[place] == 1])
+
+
+def edge_keys(ends: NDArray[Any], n: int) -> NDArray[np.int64]:
+    """One number an edge, whichever way it runs, from its ends (2, ...) among n vertices."""
+    return np.minimum(*ends).astype(np.int64) * n + np.maximum(*ends)
 
 
 def _borders(twin: NDArray[np.int32], value: NDArray[Any]) -> BoolArray:
@@ -192,8 +210,8 @@ def _edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:
     edges = np.stack(
         [_indices(array[:, i], n, f"feature_edges[:, {i}]", "vertex") for i in (0, 1)], 1
     )
-    known = _edge_keys(F.ravel(), np.roll(F, -1, axis=1).ravel(), n)
-    bad = np.flatnonzero(~np.isin(_edge_keys(edges[:, 0], edges[:, 1], n), known))
+    known = ends_of(F.ravel(), _sides(F.ravel(), None, edges.T))
+    bad = np.flatnonzero(~np.isin(edge_keys(edges.T, n), edge_keys(known, n)))
     if len(bad):
         a, b = edges[bad[0]]
         raise OptionError(
@@ -201,11 +219,6 @@ def _edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:
             f"vertices {a} and {b}"
         )
     return edges
-
-
-def _edge_keys(a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> NDArray[np.int64]:
-    """One number an edge, whichever way it runs."""
-    return np.minimum(a, b) * n + np.maximum(a, b)
 
 
 def _indices(value: Any, count: int, name: str, noun: str) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ._jit import inlined, kernel
 from ._types import NONE, FloatArray, IndexArray
-from .curves import count_at_vertices
+from .curves import Curves
 from .geometry import distance_squared
 from .halfedge import following
 
@@ -40,9 +40,7 @@ def find_corners(
     X: FloatArray,
     origin: IndexArray,
     twin: IndexArray,
-    vertex_halfedge: IndexArray,
-    is_feature: NDArray[np.bool_],
-    links: IndexArray,
+    curves: Curves,
     angle: float | str | None,
 ) -> NDArray[np.bool_]:
     """Find the corners of feature curves at the scale of the target length.
@@ -57,11 +55,7 @@ def find_corners(
     X : (n, 4) float64
         The last column is the target length.
     origin, twin : (3 m,) int32
-    vertex_halfedge : (n,) int32
-    is_feature : (3 m,) bool
-        The same on both half-edges of an edge.
-    links : (2, 3 m) int32
-        From `link_chains`.
+    curves : Curves
     angle : float, "auto" or None
         Smallest turn in degrees; 50 unless it is a number.
 
@@ -69,27 +63,25 @@ def find_corners(
     -------
     (n,) bool
     """
-    count = count_at_vertices(origin, twin, is_feature, vertex_halfedge.size)
-    is_corner = (count != 0) & (count != 2)
-    features = np.flatnonzero(is_feature)
-    if len(features):
+    is_corner = (curves.degree != 0) & (curves.degree != 2)
+    if len(curves.edges):
         limit = CORNER_TURN if angle is None or isinstance(angle, str) else float(angle)
-        _mark_turns(X, origin, twin, features, links, limit + STEP, is_corner)
+        _mark_turns(X, origin, twin, *curves[:3], limit + STEP, is_corner)
     return is_corner
 
 
 @kernel
-def _mark_turns(X, origin, twin, features, links, limit, is_corner):
+def _mark_turns(X, origin, twin, edges, after, before, limit, is_corner):
     """Walk every curve once, in one direction, and mark where it turns sharply."""
     is_done = np.zeros(origin.size, np.bool_)
-    path = np.empty(len(features) + 1, np.int32)
-    at = np.empty(len(features) + 1)
-    turn = np.empty(len(features) + 1)
+    path = np.empty(edges.size + 1, np.int32)
+    at = np.empty(edges.size + 1)
+    turn = np.empty(edges.size + 1)
     for loops in range(2):
-        for h in features:
-            if is_done[h] or (not loops and links[1, h] != NONE):
+        for first in range(edges.size):
+            if is_done[edges[first]] or (not loops and before[first] != NONE):
                 continue
-            n = _unroll(X, origin, twin, links, h, is_done, path, at)
+            n = _unroll(X, origin, twin, edges, after, first, is_done, path, at)
             is_corner[path[0]] |= not loops
             is_corner[path[n]] |= not loops
             for i in range(n + 1):
@@ -100,23 +92,24 @@ def _mark_turns(X, origin, twin, features, links, limit, is_corner):
 
 
 @inlined
-def _unroll(X, origin, twin, links, first, is_done, path, at):
+def _unroll(X, origin, twin, edges, after, first, is_done, path, at):
     """List the vertices of a curve and their arc lengths; returns the number of its edges.
 
     The last vertex of a loop is the first one again.
     """
     n = 0
-    path[0] = origin[first]
+    path[0] = origin[edges[first]]
     at[0] = 0.0
-    h = first
-    while h != NONE and not is_done[h]:
+    i = np.int64(first)
+    while i != NONE and not is_done[edges[i]]:
+        h = edges[i]
         is_done[h] = True
         if twin[h] != NONE:
             is_done[twin[h]] = True
         n += 1
         path[n] = origin[following(h)]
         at[n] = at[n - 1] + sqrt(distance_squared(X, path[n - 1], path[n]))
-        h = np.int64(links[0, h])
+        i = np.int64(after[i])
     return n
 
 

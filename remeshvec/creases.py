@@ -8,19 +8,21 @@ echo (`_echo`), are linked to chains and kept if the chain is long or sure enoug
 
 from __future__ import annotations
 
-from math import acos, cos, degrees, radians, sqrt
+from math import acos, degrees, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._chains import BORDER, CLEAN, HARD, STRONG, SURE, WEAK, count_chains, keep_chains
-from ._echo import echoes_beside, face_cosine
-from ._jit import inlined, kernel
+from ._echo import echo_cosines, echoes_beside
+from ._jit import inlined, threaded
 from ._types import MAX_VALENCE, NONE, FloatArray, IndexArray
 from .geometry import angle_from_cosine, distance_squared, face_vector
-from .halfedge import following, previous
+from .halfedge import previous
+from .turns import ANGLE_TOLERANCE, PROPER, Turns, face_cosine, find_turns, least_cosine
 
-__all__ = ["find_creases"]
+__all__ = ["find_creases", "least_turn"]
 
 # Degrees that an edge must turn to be a candidate, and to be more than a weak one. What turns by
 # more than the last is no tessellation: it is sure with less, and may have echoes (plates, blades).
@@ -41,13 +43,8 @@ ECHO_REACH = 1.5
 CLEAN_REACH = 1.25
 FLAT_HEIGHT = 2.5
 
-# Degrees by which turns may miss a threshold.
-ANGLE_TOLERANCE = 1e-6
-
-# A face flatter than this share of its longest edge and of the target length has no normal of its
-# own: coordinates in single precision turn it by 0.1 degrees and more.
-SLIVER = 1e-3
-SLIVER_ROUNDS = 8
+# Elements in a piece of a loop.
+_PIECE = 1024
 
 
 def find_creases(
@@ -57,6 +54,9 @@ def find_creases(
     vertex_halfedge: IndexArray,
     hard: NDArray[np.bool_],
     angle: float | str | None,
+    mean_edge: float,
+    turns: Turns | None = None,
+    parallel: bool = False,
 ) -> tuple[NDArray[np.bool_], dict[str, int]]:
     """Find the feature edges of a mesh.
 
@@ -71,6 +71,11 @@ def find_creases(
         are without being named.
     angle : "auto", float or None
         The rule of this module; or all edges that turn by more than so many degrees; or none.
+    mean_edge : float
+        Mean length of the edges.
+    turns : Turns, optional
+        The edges that turn by `least_turn` of ``angle`` or more, where they are known.
+    parallel : bool
 
     Returns
     -------
@@ -87,17 +92,14 @@ def find_creases(
         ("crease_edges", "chains", "dropped_echo", "dropped_noise", "dropped_short"), 0
     )
     if angle is not None:
-        is_auto = angle == "auto"
-        limit = WEAK_TURN - ANGLE_TOLERANCE if is_auto else float(angle) + ANGLE_TOLERANCE
-        normals = np.empty((origin.size // 3, 3))
-        state = np.zeros(origin.size // 3, np.uint8)
-        found = np.empty(origin.size // 2, np.int64)
-        # 1e-14: rounding of the cosine itself, for limits near 0.
-        cosine = cos(radians(min(limit, 180.0))) - 1e-14
-        found = found[: _find_turns(X, origin, twin, is_feature, cosine, normals, state, found)]
-        if is_auto and len(found):
+        if turns is None:
+            turns = find_turns(X, origin, twin, least_turn(angle), parallel)
+        found = turns.edges[~is_feature[turns.edges]]
+        if angle == "auto":
             mesh = X, origin, twin, vertex_halfedge
-            found = _creases(mesh, normals, state, is_feature, found, counts)
+            found = _creases(mesh, turns, is_feature, found, mean_edge, counts, parallel)
+        else:
+            found = found[_cosines(turns.normals, twin, found) <= least_cosine(least_turn(angle))]
         is_feature[found] = True
         is_feature[twin[found]] = True
     edges = _one_of_each(is_feature, twin)
@@ -105,6 +107,21 @@ def find_creases(
     if counts["crease_edges"]:
         counts["chains"] = count_chains(X, origin, twin, edges)
     return is_feature, counts
+
+
+def least_turn(angle: float | str | None) -> float:
+    """Degrees by which an edge must turn to be a candidate; for none those of the rule."""
+    if angle is None or isinstance(angle, str):
+        return WEAK_TURN - ANGLE_TOLERANCE
+    return float(angle) + ANGLE_TOLERANCE
+
+
+def _cosines(
+    normals: FloatArray, twin: IndexArray, edges: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Cosines of the turns across edges; the same bits as `face_cosine`."""
+    a, b = normals[edges // 3].T, normals[twin[edges] // 3].T
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 def _one_of_each(is_feature: NDArray[np.bool_], twin: IndexArray) -> NDArray[np.int64]:
@@ -115,149 +132,101 @@ def _one_of_each(is_feature: NDArray[np.bool_], twin: IndexArray) -> NDArray[np.
 
 def _creases(
     mesh: tuple[FloatArray, IndexArray, IndexArray, IndexArray],
-    normals: FloatArray,
-    state: NDArray[np.uint8],
+    turns: Turns,
     is_hard: NDArray[np.bool_],
     found: NDArray[np.int64],
+    mean_edge: float,
     counts: dict[str, int],
+    parallel: bool,
 ) -> NDArray[np.int64]:
     """Of the edges that turn far enough, keep the creases; counts the others by reason."""
     X, origin, twin, _ = mesh
-    rank = np.zeros(len(found), np.uint8)
-    noise, echo = _rank_edges(*mesh, normals, state, is_hard, found, rank)
+    if not len(found):
+        return found
+    rank = np.empty(len(found), np.int8)
+    noise = _noise(mesh, turns, found, parallel)
+    _rank_edges(parallel, found, X, origin, twin, noise, turns.normals, is_hard, rank)
+    counts["dropped_noise"] = int(np.count_nonzero(rank == _NOISE))
+    counts["dropped_echo"] = int(np.count_nonzero(rank == _ECHO))
     found, rank = found[rank > 0], rank[rank > 0]
-    counts["dropped_noise"], counts["dropped_echo"] = noise, echo
     if not len(found):
         return found
     fixed = _one_of_each(is_hard, twin)
     edges = np.concatenate([fixed, found])
-    hard = np.where(twin[fixed] == NONE, BORDER, HARD).astype(np.uint8)
+    hard = np.where(twin[fixed] == NONE, BORDER, HARD).astype(np.int8)
     rank = np.concatenate([hard, rank])
-    keep = keep_chains(X, origin, edges, rank, _mean_edge(X, origin, twin))[len(fixed) :]
+    keep = keep_chains(X, origin, edges, rank, mean_edge)[len(fixed) :]
     counts["dropped_short"] = int((~keep).sum())
     return found[keep]
 
 
-@kernel
-def _mean_edge(X, origin, twin):
-    total = 0.0
-    count = 0
-    for h in range(origin.size):
-        if twin[h] < h:
-            total += sqrt(distance_squared(X, origin[h], origin[following(h)]))
-            count += 1
-    return total / count
+def _noise(
+    mesh: tuple[FloatArray, IndexArray, IndexArray, IndexArray],
+    turns: Turns,
+    found: NDArray[np.int64],
+    parallel: bool,
+) -> FloatArray:
+    """Mean turn, in degrees, across the smoothest side of each face at the ends of edges.
 
-
-# -- turns ------------------------------------------------------------------------------------
-
-PROPER = 0  # a face with a normal of its own
-LENT = 1  # a sliver, with the normal of a face beside it
-MISSING = 2  # a sliver without
-
-
-@kernel
-def _find_turns(X, origin, twin, is_hard, cosine, normals, state, found):
-    """List inner edges whose faces' normals have at most this cosine; fills the normals."""
-    slivers = 0
-    for f in range(origin.size // 3):
-        slivers += _fill_normal(X, origin, f, normals, state)
-    if slivers:
-        _lend_normals(X, origin, twin, normals, state)
-    count = 0
-    for h in range(origin.size):
-        t = np.int64(twin[h])
-        if t >= h or t == NONE or is_hard[h]:
-            continue
-        if face_cosine(normals, h // 3, t // 3) <= cosine and (
-            not slivers or (state[h // 3] != MISSING and state[t // 3] != MISSING)
-        ):
-            found[count] = h
-            count += 1
-    return count
-
-
-@inlined
-def _fill_normal(X, origin, f, normals, state):
-    """Set the unit normal of a face; returns 1 for a sliver."""
-    a, b, c = origin[3 * f], origin[3 * f + 1], origin[3 * f + 2]
-    x, y, z = face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
-    double_area = sqrt(x * x + y * y + z * z)
-    longest = max(distance_squared(X, a, b), distance_squared(X, b, c), distance_squared(X, c, a))
-    if not double_area > SLIVER * min(longest, sqrt(longest) * X[a, 3]):
-        state[f] = MISSING
-        normals[f, 0] = 0.0
-        normals[f, 1] = 0.0
-        normals[f, 2] = 0.0
-        return 1
-    normals[f, 0] = x / double_area
-    normals[f, 1] = y / double_area
-    normals[f, 2] = z / double_area
-    return 0
-
-
-@inlined
-def _lend_normals(X, origin, twin, normals, state):
-    """Give slivers the normal across their longest side that has one, round by round.
-
-    So a crease that runs along a cap goes over its short sides, in one piece.
+    Weighted by area. Of flat faces, which have many vertices, the turn is computed once.
     """
-    for _ in range(SLIVER_ROUNDS):
-        for f in range(origin.size // 3):
-            if state[f] != MISSING:
-                continue
-            longest = -1.0
-            for h in range(3 * f, 3 * f + 3):
-                t = twin[h]
-                side = distance_squared(X, origin[h], origin[following(h)])
-                if t != NONE and state[t // 3] != MISSING and side > longest:
-                    longest = side
-                    state[f] = LENT
-                    for axis in range(3):
-                        normals[f, axis] = normals[t // 3, axis]
+    X, origin, twin, vertex_halfedge = mesh
+    is_asked = np.zeros(len(X), np.bool_)
+    is_asked[origin[found]] = True
+    is_asked[origin[twin[found]]] = True
+    faces = np.empty((len(origin) // 3, 3))
+    _measure_faces(parallel, X, origin, twin, turns.normals, turns.state, is_asked, faces)
+    noise = np.empty(len(X))
+    _sum_noise(parallel, X, origin, twin, vertex_halfedge, faces, is_asked, noise)
+    return noise
 
 
 # -- noise and echo ---------------------------------------------------------------------------
 
+# Instead of a class.
+_NOISE = 0
+_ECHO = -1
 
-@kernel
-def _rank_edges(X, origin, twin, vertex_halfedge, normals, state, is_hard, found, rank):
-    """Class every edge, 0 for those in the noise and those that echo; returns how many of each."""
-    noise_at = np.full(vertex_halfedge.size, -1.0)
-    in_noise = 0
-    echoing = 0
-    for k in range(len(found)):
+
+def _per_piece(first: NDArray[Any], *_: Any) -> int:
+    return -(-len(first) // _PIECE)
+
+
+def _per_piece_of_faces(X: FloatArray, origin: IndexArray, *_: Any) -> int:
+    return -(-origin.size // (3 * _PIECE))
+
+
+@threaded(_per_piece)
+def _rank_edges(span, found, X, origin, twin, noise, normals, is_hard, rank):
+    """Class every edge, or say why it is none."""
+    for k in range(_PIECE * span[0], min(_PIECE * span[1], len(found))):
         h = found[k]
         t = np.int64(twin[h])
-        noise = 0.0
-        target = 0.0
-        for v in (origin[h], origin[t]):
-            if noise_at[v] < 0.0:
-                noise_at[v] = _noise(X, origin, twin, normals, state, np.int64(vertex_halfedge[v]))
-            noise = max(noise, noise_at[v])
-            target += 0.5 * X[v, 3]
-        cosine = face_cosine(normals, h // 3, t // 3)
-        turn = degrees(acos(min(1.0, max(-1.0, cosine)))) + ANGLE_TOLERANCE
-        rank[k] = _class(turn, noise)
-        if rank[k] == 0:
-            in_noise += 1
-        elif turn < STEEP_TURN:
-            is_clean = turn >= CLEAN_RATIO * noise
-            reach = target * (CLEAN_REACH if is_clean else ECHO_REACH)
-            total = 0
-            open_sides = 0
-            for g in (h, t):
-                echoes, is_cut_short = echoes_beside(X, origin, twin, normals, is_hard, g, reach)
+        v, w = origin[h], origin[t]
+        noise_here = max(noise[v], noise[w])
+        angle = acos(min(1.0, max(-1.0, face_cosine(normals, h // 3, t // 3))))
+        turn = degrees(angle) + ANGLE_TOLERANCE
+        rank[k] = _class(turn, noise_here)
+        if rank[k] == _NOISE or turn >= STEEP_TURN:
+            continue
+        is_clean = turn >= CLEAN_RATIO * noise_here
+        target = 0.5 * X[v, 3] + 0.5 * X[w, 3]
+        reach = target * (CLEAN_REACH if is_clean else ECHO_REACH)
+        # In noise one echo is enough. A clean turn that comes twice makes a chamfer or a land;
+        # if it comes three times it is curvature.
+        enough = 2 if is_clean else 1
+        quiet, loud = echo_cosines(angle)
+        total = 0
+        open_sides = 0
+        for g in (h, t):
+            if total < enough:
+                echoes, is_cut_short = echoes_beside(
+                    X, origin, twin, normals, is_hard, g, reach, quiet, loud, enough
+                )
                 total += echoes
                 open_sides += echoes == 0 and not is_cut_short
-            # In noise one echo is enough. A clean turn that comes twice makes a chamfer or a land;
-            # if it comes three times it is curvature.
-            if total >= 2 or (total == 1 and (open_sides == 0 or not is_clean)):
-                rank[k] = 0
-                echoing += 1
-    return in_noise, echoing
+        if total >= enough or (total == 1 and open_sides == 0):
+            rank[k] = _ECHO
 
 
 @inlined
@@ -273,38 +242,48 @@ def _class(turn, noise):
     return WEAK if turn >= WEAK_RATIO * noise else 0
 
 
-@inlined
-def _noise(X, origin, twin, normals, state, start):
-    """Mean turn, in degrees, across the smoothest side of each face at a vertex, weighted by area."""
-    area = 0.0
-    total = 0.0
-    longest_target = FLAT_HEIGHT * X[origin[start], 3]
-    g = start
-    for _ in range(MAX_VALENCE):
-        f = g // 3
-        if state[f] == PROPER:
-            a, b, c = origin[3 * f], origin[3 * f + 1], origin[3 * f + 2]
-            x, y, z = face_vector(
-                X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-            )
-            double_area = sqrt(x * x + y * y + z * z)
-            longest = sqrt(
-                max(distance_squared(X, a, b), distance_squared(X, b, c), distance_squared(X, c, a))
-            )
+@threaded(_per_piece_of_faces)
+def _measure_faces(span, X, origin, twin, normals, state, is_asked, faces):
+    """Twice the area of a face, its longest side, the smallest of its turns in radians."""
+    for f in range(_PIECE * span[0], min(_PIECE * span[1], state.size)):
+        a, b, c = origin[3 * f], origin[3 * f + 1], origin[3 * f + 2]
+        if not (is_asked[a] or is_asked[b] or is_asked[c]):
+            continue
+        faces[f, 0] = faces[f, 1] = faces[f, 2] = 0.0
+        if state[f] != PROPER:
+            continue
+        x, y, z = face_vector(
+            X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
+        )
+        faces[f, 0] = sqrt(x * x + y * y + z * z)
+        faces[f, 1] = sqrt(
+            max(distance_squared(X, a, b), distance_squared(X, b, c), distance_squared(X, c, a))
+        )
+        best = -2.0
+        for h in range(3 * f, 3 * f + 3):
+            t = twin[h]
+            if t != NONE and state[t // 3] == PROPER:
+                best = max(best, face_cosine(normals, f, t // 3))
+        faces[f, 2] = angle_from_cosine(best) if best >= -1.5 else 0.0
+
+
+@threaded(_per_piece)
+def _sum_noise(span, X, origin, twin, vertex_halfedge, faces, is_asked, noise):
+    for v in range(_PIECE * span[0], min(_PIECE * span[1], noise.size)):
+        if not is_asked[v]:
+            continue
+        area = 0.0
+        total = 0.0
+        height = FLAT_HEIGHT * X[v, 3]
+        start = np.int64(vertex_halfedge[v])
+        g = start
+        for _ in range(MAX_VALENCE):
+            f = g // 3
+            double_area = faces[f, 0]
             area += double_area
-            if double_area <= longest_target * longest:
-                total += double_area * _smoothest_turn(twin, normals, state, f)
-        g = np.int64(twin[previous(g)])
-        if g == NONE or g == start:
-            break
-    return degrees(total / area) if area > 0.0 else 0.0
-
-
-@inlined
-def _smoothest_turn(twin, normals, state, f):
-    best = -2.0
-    for h in range(3 * f, 3 * f + 3):
-        t = twin[h]
-        if t != NONE and state[t // 3] == PROPER:
-            best = max(best, face_cosine(normals, f, t // 3))
-    return angle_from_cosine(best) if best >= -1.5 else 0.0
+            if double_area <= height * faces[f, 1]:
+                total += double_area * faces[f, 2]
+            g = np.int64(twin[previous(g)])
+            if g == NONE or g == start:
+                break
+        noise[v] = degrees(total / area) if area > 0.0 else 0.0

@@ -17,7 +17,7 @@ from ._jit import compile_notice
 from ._threads import thread_scope
 from ._types import FIXED, FROZEN, NONE, Blocks, FloatArray, IndexArray, Mesh
 from .clean import weld_vertices
-from .constraints import Constraints
+from .constraints import Constraints, edge_keys
 from .edge_sets import make_blocks
 from .halfedge import ends_of
 from .operations.project import Reference, locate_vertices
@@ -153,8 +153,9 @@ def _curve_ends(mesh: Mesh, built: Built) -> NDArray[Any]:
     ends = ends_of(mesh.origin, h)
     is_frozen = mesh.curve[h] == FROZEN
     if is_frozen.any():
-        at = np.sort(built.reference.origin[mesh.birth[ends]].astype(np.int64), axis=0)
-        is_feature = np.isin(at[0] * len(built.reference.X) + at[1], built.feature_keys)
+        origin = built.reference.origin
+        known = edge_keys(ends_of(origin, built.features), len(built.reference.X))
+        is_feature = np.isin(edge_keys(origin[mesh.birth[ends]], len(built.reference.X)), known)
         is_feature &= (mesh.kind[ends] == FIXED).all(axis=0)
         ends = ends[:, ~is_frozen | is_feature]
     return ends

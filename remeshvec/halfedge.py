@@ -20,7 +20,7 @@ from .twins import PINCHED, BuildReport, following, match_half_edges, previous
 __all__ = ["BuildReport", "build_mesh", "ends_of", "following", "previous"]
 
 
-def ends_of(origin: IndexArray, h: NDArray[Any]) -> IndexArray:
+def ends_of(origin: NDArray[Any], h: NDArray[Any]) -> NDArray[Any]:
     """Return the vertices where half-edges start and end, (2, k), from their numbers (k,)."""
     return origin[np.stack([h, h - h % 3 + (h + 1) % 3])]
 

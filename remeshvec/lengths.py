@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from .constraints import Marks
 from .creases import find_creases
 from .errors import MeshInputError, OptionError
 from .geometry import distance_squared, face_vector
-from .halfedge import ends_of, following
+from .halfedge import ends_of
 from .prepare import Prepared
 from .sizing import Adaptive, adaptive_lengths, expected_faces, limit_gradation, target_lengths
 
@@ -159,17 +159,28 @@ def set_lengths(
         lengths = _adaptive(prepared, measures, L, marks.hard, feature_angle, _ADAPTIVE_SHARE)
     else:
         asked = target_lengths(V, L) if L is not None else 0.9 * measures.mean_edge / prepared.scale
+        if not isinstance(asked, np.ndarray) and max_deviation is None:
+            return _set_one(prepared, measures, float(_in_range(asked * prepared.scale)), max_faces)
         if not isinstance(asked, np.ndarray):
             asked = np.full(len(V), asked)
         lengths = _in_range(asked[prepared.vertex_source] * prepared.scale)
     if max_deviation is not None:
         lengths = _near_input(prepared, measures, lengths, max_deviation, marks.hard, feature_angle)
-    X[:, 3] = limited_lengths(prepared, lengths, gradation)
-    expected = expected_faces(X, prepared.mesh.origin, X[:, 3])
-    _check_output(prepared, measures, expected, max_faces)
-    if X[:, 3].max() == X[:, 3].min():
-        return float(X[0, 3])
-    return sqrt(measures.area / (expected * _FACE))
+    lengths = limited_lengths(prepared, lengths, gradation)
+    X[:, 3] = lengths
+    expected = expected_faces(X, prepared.mesh.origin, lengths)
+    shortest, longest = float(lengths.min()), float(lengths.max())
+    _check_output(prepared, measures, shortest, longest, expected, max_faces)
+    return shortest if shortest == longest else sqrt(measures.area / (expected * _FACE))
+
+
+def _set_one(prepared: Prepared, measures: Measures, length: float, max_faces: int) -> float:
+    """Set the same length everywhere."""
+    prepared.mesh.X[:, 3] = length
+    face = _FACE * length * length
+    expected = measures.area / face if face > 0.0 else inf
+    _check_output(prepared, measures, length, length, expected, max_faces)
+    return length
 
 
 def _near_input(
@@ -221,7 +232,7 @@ def _adaptive(
     # Creases are sought at the scale of the input's edges: the lengths follow from them.
     mesh.X[:, 3] = min(max(measures.mean_edge, shortest), longest)
     arrays = (mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge)
-    is_feature, _ = find_creases(*arrays, hard, feature_angle)
+    is_feature, _ = find_creases(*arrays, hard, feature_angle, measures.mean_edge)
     tolerance = share * spec.tolerance * prepared.scale
     return adaptive_lengths(*arrays, is_feature, tolerance, shortest, longest)
 
@@ -245,12 +256,18 @@ def limited_lengths(prepared: Prepared, lengths: FloatArray, gradation: float) -
     return lengths
 
 
-def _check_output(prepared: Prepared, measures: Measures, expected: float, max_faces: int) -> None:
-    X, scale = prepared.mesh.X, prepared.scale
-    shortest = float(X[:, 3].min())
+def _check_output(
+    prepared: Prepared,
+    measures: Measures,
+    shortest: float,
+    longest: float,
+    expected: float,
+    max_faces: int,
+) -> None:
+    scale = prepared.scale
     what = f"L = {shortest / scale:g}"
-    if X[:, 3].max() > shortest:
-        what = f"L from {shortest / scale:g} to {X[:, 3].max() / scale:g}"
+    if longest > shortest:
+        what = f"L from {shortest / scale:g} to {longest / scale:g}"
     if not expected <= max_faces:
         raise OptionError(
             f"{what} would give about {expected:.3g} faces, more than "
@@ -266,7 +283,10 @@ def _check_output(prepared: Prepared, measures: Measures, expected: float, max_f
 
 @kernel
 def _measure(mesh):
-    """Total area, mean edge length, number of faces without area."""
+    """Total area, mean edge length, number of faces without area.
+
+    All sides are measured and half of them dropped: which one no processor can predict.
+    """
     X = mesh.X
     area = 0.0
     edges = 0.0
@@ -279,14 +299,14 @@ def _measure(mesh):
         nx, ny, nz = face_vector(
             X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
         )
-        face_area = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
+        face_area = 0.5 * sqrt(nx * nx + ny * ny + nz * nz)
         area += face_area
-        if face_area == 0.0:
-            flat += 1
-        for h in range(3 * f, 3 * f + 3):
-            if mesh.twin[h] < h:
-                edges += np.sqrt(
-                    distance_squared(X, mesh.origin[h], mesh.origin[following(np.int64(h))])
-                )
-                count += 1
+        flat += face_area == 0.0
+        ab = np.int64(mesh.twin[3 * f] < 3 * f)
+        bc = np.int64(mesh.twin[3 * f + 1] < 3 * f + 1)
+        ca = np.int64(mesh.twin[3 * f + 2] < 3 * f + 2)
+        edges += sqrt(distance_squared(X, a, b)) * ab
+        edges += sqrt(distance_squared(X, b, c)) * bc
+        edges += sqrt(distance_squared(X, c, a)) * ca
+        count += ab + bc + ca
     return area, edges / count, flat

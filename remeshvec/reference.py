@@ -5,21 +5,23 @@ Here constraints become the arrays that all phases read: kinds of vertices, curv
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._jit import kernel
 from ._types import CURVE, FIXED, FROZEN, HELD, INNER, NONE, SEAM, IndexArray, Mesh
 from .bvh import Surface
 from .constraints import Marks
 from .corners import find_corners
-from .creases import find_creases
+from .creases import find_creases, least_turn
 from .curves import link_chains
-from .features import apexes
-from .halfedge import ends_of
+from .features import LEAST_TURN, apexes
+from .halfedge import ends_of, following
 from .operations.project import Reference
 from .polyline import find_siblings, join_edges, measure_arcs, name_edges
+from .turns import find_turns
 
 __all__ = ["Built", "build_reference"]
 
@@ -32,13 +34,13 @@ class Built(NamedTuple):
     reference: Reference
     on_seam: BoolArray | None  # (n,) vertices of the reference where sheets meet; None for none
     held: BoolArray | None  # (m,) faces of the reference that stay; None for none
-    feature_keys: NDArray[np.int64]  # edges on features: smaller end times n, plus the larger one
+    features: IndexArray  # half-edges of the reference on features
     counts: dict[str, int]  # of features
 
     @property
     def has_curves(self) -> bool:
         """Whether there are features or boundaries."""
-        return len(self.feature_keys) > 0
+        return len(self.features) > 0
 
 
 def build_reference(
@@ -46,6 +48,7 @@ def build_reference(
     vertex_source: IndexArray,
     feature_angle: float | str | None,
     marks: Marks,
+    mean_edge: float,
     parallel: bool,
 ) -> Built:
     """Find the features of a mesh before its first sweep, mark them in it, and build the reference.
@@ -59,46 +62,40 @@ def build_reference(
     feature_angle : float, "auto" or None
     marks : Marks
         What the caller wants to stay.
+    mean_edge : float
+        Mean length of the edges.
     parallel : bool
     """
     origin, twin = mesh.origin.copy(), mesh.twin.copy()
-    members, group = find_siblings(mesh.X, origin, np.flatnonzero(twin == NONE).astype(np.int32))
-    arrays = (mesh.X, origin, twin, mesh.vertex_halfedge)
-    is_feature, counts = find_creases(*arrays, marks.hard, feature_angle)
-    links = link_chains(origin, twin, mesh.vertex_halfedge, is_feature)
-    name = name_edges(twin, is_feature, members, group)
-    fixed = marks.fixed | find_corners(*arrays, is_feature, links, feature_angle)
+    arrays = mesh.X, origin, twin
+    turns = find_turns(*arrays, min(LEAST_TURN, least_turn(feature_angle)), parallel)
+    is_feature, counts = find_creases(
+        *arrays, mesh.vertex_halfedge, marks.hard, feature_angle, mean_edge, turns, parallel
+    )
+    curves = link_chains(origin, twin, is_feature, len(mesh.X))
+    members, group = find_siblings(mesh.X, origin, curves.edges[twin[curves.edges] == NONE])
+    names = name_edges(twin, curves.edges, members, group, mesh.curve)
+    fixed = marks.fixed | find_corners(*arrays, curves, feature_angle)
     on_seam = None
     if len(members):
         on_seam = np.zeros(len(mesh.X), np.bool_)
-        on_seam[_ends(origin, members)] = True
-        fixed |= _junctions(origin, name, vertex_source, on_seam)
+        on_seam[ends_of(origin, members)] = True
+        fixed |= _junctions(origin, curves.edges, mesh.curve, vertex_source, on_seam)
         fixed = _agree(fixed, vertex_source, on_seam)
-
-    counts["corners"] = int((fixed & _touched(origin, is_feature, len(fixed))).sum())
-    beside = join_edges(name, links, origin, fixed)
-    _mark(mesh, origin, is_feature, marks.frozen, name, members, fixed)
-    mesh.kind[apexes(mesh)] = HELD
-    is_wall = is_feature if marks.held is None else is_feature | _walls(twin, marks.held)
-    arcs = measure_arcs(mesh.X, origin, name, beside)
+    counts["corners"] = int(np.count_nonzero(fixed & (curves.degree > 0)))
+    beside = join_edges(mesh.curve, curves, origin, fixed)
+    _mark(mesh, curves.edges, fixed)
+    mesh.curve[members] += SEAM
+    mesh.curve[marks.frozen] = FROZEN
+    mesh.kind[apexes(mesh, turns)] = HELD
     X = mesh.X.copy()
-    twin[is_wall] = NONE
-    surface = Surface(X, origin, twin, parallel)
-    reference = Reference(surface, X, origin, beside, arcs)
+    arcs = measure_arcs(X, origin, names, beside)
+    if marks.held is not None:
+        twin[_walls(twin, marks.held)] = NONE
+    twin[curves.edges] = NONE
+    reference = Reference(Surface(X, origin, twin, parallel), X, origin, beside, arcs)
     _lengthen_beside(mesh, vertex_source, marks.frozen)
-    keys = _edge_keys(origin, is_feature, len(fixed))
-    return Built(reference, on_seam, marks.held, keys, counts)
-
-
-def _ends(origin: IndexArray, which: NDArray[Any]) -> IndexArray:
-    """Both ends of half-edges, given as a mask or as indices."""
-    h: NDArray[Any] = np.flatnonzero(which) if which.dtype == np.bool_ else which
-    return ends_of(origin, h).ravel()
-
-
-def _edge_keys(origin: IndexArray, which: BoolArray, n: int) -> NDArray[np.int64]:
-    ends = np.sort(_ends(origin, which).reshape(2, -1).astype(np.int64), axis=0)
-    return ends[0] * n + ends[1]
+    return Built(reference, on_seam, marks.held, curves.edges, counts)
 
 
 def _lengthen_beside(mesh: Mesh, vertex_source: IndexArray, frozen: BoolArray) -> None:
@@ -109,7 +106,7 @@ def _lengthen_beside(mesh: Mesh, vertex_source: IndexArray, frozen: BoolArray) -
     """
     h = np.flatnonzero(frozen)
     if len(h):
-        a, b = _ends(mesh.origin, h).reshape(2, -1)
+        a, b = ends_of(mesh.origin, h)
         length = np.linalg.norm(mesh.X[a, :3] - mesh.X[b, :3], axis=1)
         longest = np.zeros(int(vertex_source.max()) + 1)  # the same on all sheets
         np.maximum.at(longest, vertex_source[a], length)
@@ -117,29 +114,25 @@ def _lengthen_beside(mesh: Mesh, vertex_source: IndexArray, frozen: BoolArray) -
         np.maximum(mesh.X[:, 3], longest[vertex_source], out=mesh.X[:, 3])
 
 
-def _touched(origin: IndexArray, is_feature: BoolArray, n: int) -> BoolArray:
-    touched = np.zeros(n, np.bool_)
-    touched[_ends(origin, is_feature)] = True
-    return touched
-
-
-def _walls(twin: IndexArray, held: BoolArray) -> BoolArray:
+def _walls(twin: IndexArray, held: BoolArray) -> NDArray[np.int64]:
     """Half-edges between faces that stay and faces that do not."""
-    h = np.flatnonzero(twin != NONE)
-    wall = np.zeros(len(twin), np.bool_)
-    wall[h] = held[h // 3] != held[twin[h] // 3]
-    return wall
+    h = np.flatnonzero(np.repeat(held, 3) & (twin != NONE))
+    h = h[~held[twin[h] // 3]]
+    return np.concatenate([h, twin[h]])
 
 
 def _junctions(
-    origin: IndexArray, name: IndexArray, vertex_source: IndexArray, on_seam: BoolArray
+    origin: IndexArray,
+    edges: IndexArray,
+    name: IndexArray,
+    vertex_source: IndexArray,
+    on_seam: BoolArray,
 ) -> BoolArray:
     """Vertices where seams end, branch, or change the number of their sheets.
 
     Elsewhere exactly two edges of curves meet, and every sheet has both.
     """
-    edges = np.flatnonzero(name != NONE)
-    ends = _ends(origin, edges)
+    ends = ends_of(origin, edges).ravel()
     names = np.concatenate([name[edges], name[edges]])
     per_copy = np.unique(np.stack([ends, names]), axis=1)[0]
     per_source = np.unique(np.stack([vertex_source[ends], names]), axis=1)[0]
@@ -160,26 +153,22 @@ def _agree(fixed: BoolArray, vertex_source: IndexArray, on_seam: BoolArray) -> B
     return fixed | (at_seam & is_fixed)[vertex_source]
 
 
-def _mark(
-    mesh: Mesh,
-    origin: IndexArray,
-    is_feature: BoolArray,
-    is_frozen: BoolArray,
-    name: IndexArray,
-    members: IndexArray,
-    fixed: BoolArray,
-) -> None:
-    """Set kinds, curves and births; the copies of a vertex on a seam get the same birth."""
-    edges = np.flatnonzero(is_feature)
-    mesh.curve[:] = name
-    mesh.curve[members] += SEAM
-    mesh.curve[is_frozen] = FROZEN
-    mesh.kind[:] = INNER
-    ends = _ends(origin, edges)
-    mesh.kind[ends] = CURVE
-    mesh.kind[fixed] = FIXED
+def _mark(mesh: Mesh, edges: IndexArray, fixed: BoolArray) -> None:
+    """Set kinds and births; the copies of a vertex on a seam get the same birth."""
+    mesh.kind.fill(INNER)
     mesh.birth[:] = mesh.vertex_halfedge
-    smallest = np.full(len(fixed), np.iinfo(np.int32).max, np.int32)
-    np.minimum.at(smallest, ends, np.concatenate([name[edges], name[edges]]))
-    on_curve = mesh.kind == CURVE
-    mesh.birth[on_curve] = smallest[on_curve]
+    if len(edges):
+        _mark_curves(mesh, edges)
+    v = np.flatnonzero(fixed)
+    mesh.kind[v] = FIXED
+    mesh.birth[v] = mesh.vertex_halfedge[v]
+
+
+@kernel
+def _mark_curves(mesh, edges):
+    """Let vertices on curves be born on that of their edges which has the smallest name."""
+    for h in edges:
+        for v in (mesh.origin[h], mesh.origin[following(h)]):
+            if mesh.kind[v] != CURVE or mesh.curve[h] < mesh.birth[v]:
+                mesh.kind[v] = CURVE
+                mesh.birth[v] = mesh.curve[h]

@@ -307,7 +307,8 @@ class _Job:
                 self.sweeps.options.max_deviation,
             )
             parallel = self.sweeps.is_parallel(len(mesh.origin) // 3)
-            built = build_reference(mesh, prepared.vertex_source, angle, marks, parallel)
+            mean_edge = self.measures.mean_edge
+            built = build_reference(mesh, prepared.vertex_source, angle, marks, mean_edge, parallel)
         mesh = self.sweeps.run(mesh, built)
         mesh = self.sweeps.finish(mesh, built)
         return _Done(mesh, built, length / prepared.scale)

@@ -65,7 +65,7 @@ _SAMPLE_SHARE = 1.0
 _ROUGH = 0.05
 
 # Collapses leave holes. Above this share of the faces they are closed, because every loop reads them.
-_SPARSE = 0.25
+_SPARSE = 1.0 / 3.0
 
 # Sweeps, counted from the last one as 1, after which lengths are compared with what they led to.
 _FEEDBACK = (7, 5, 3)
@@ -238,6 +238,7 @@ class Sweeps:
                 refined, n_split = split_long_edges(mesh, blocks, factor, parallel, siblings, flags)
                 count += n_split
                 if refined is mesh:
+                    flags = flags._replace(n_gone=flags.n_gone - 2 * n_split)
                     break
                 mesh, blocks = refined, make_blocks(refined)
             else:

@@ -24,6 +24,7 @@ from remeshvec._types import (
 )
 from remeshvec.bvh import build_tree
 from remeshvec.constraints import make_constraints
+from remeshvec.curves import link_chains
 from remeshvec.edge_sets import make_blocks
 from remeshvec.halfedge import build_mesh
 from remeshvec.operations.project import Reference, locate_vertices, project_vertices
@@ -97,7 +98,27 @@ def featured(
     F = vertex_source[mesh.origin.reshape(-1, 3)].astype(np.int64)
     constraints = make_constraints(int(F.max()) + 1, F, **{"feature_angle": None, **wanted})
     marks = constraints.on_mesh(mesh, vertex_source, np.arange(len(F)), None)
-    return build_reference(mesh, vertex_source, constraints.feature_angle, marks, parallel)
+    mean_edge = mean_edge_of(mesh)
+    return build_reference(
+        mesh, vertex_source, constraints.feature_angle, marks, mean_edge, parallel
+    )
+
+
+def mean_edge_of(mesh: Mesh) -> float:
+    """Mean length of the edges."""
+    once = mesh.twin < np.arange(mesh.origin.size)
+    F = mesh.origin.reshape(-1, 3)
+    P = mesh.X[:, :3]
+    return float(np.linalg.norm(P[F[:, [1, 2, 0]]] - P[F], axis=2).ravel()[once].mean())
+
+
+def links_of(mesh: Mesh, is_feature) -> np.ndarray:
+    """What follows and what precedes every feature half-edge on its curve, (2, 3 m)."""
+    curves = link_chains(mesh.origin, mesh.twin, is_feature, len(mesh.X))
+    links = np.full((2, mesh.origin.size), NONE, np.int32)
+    for row, places in zip(links, (curves.after, curves.before), strict=True):
+        row[curves.edges] = np.where(places == NONE, NONE, curves.edges[places])
+    return links
 
 
 def referenced(mesh: Mesh, length: float | None = None, **wanted) -> Reference:

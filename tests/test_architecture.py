@@ -17,7 +17,7 @@ LEVELS = {
     1: ["geometry"],
     2: ["halfedge", "twins", "order", "orient", "edge_sets", "bvh", "curves", "polyline", "clean"],
     3: [
-        "quality", "distance", "features", "creases", "_chains", "_echo", "corners", "sizing",
+        "quality", "distance", "features", "turns", "creases", "_chains", "_echo", "corners", "sizing",
         "curvature", "gradation",
     ],
     4: [
@@ -38,7 +38,9 @@ SIDEWAYS = {
     ("_check", "errors"), ("_jit", "_threads"),
     ("halfedge", "twins"), ("twins", "order"),
     ("bvh", "halfedge"), ("curves", "halfedge"), ("orient", "twins"), ("polyline", "halfedge"),
-    ("creases", "_chains"), ("creases", "_echo"), ("sizing", "curvature"), ("sizing", "gradation"),
+    ("polyline", "curves"),
+    ("creases", "_chains"), ("creases", "_echo"), ("creases", "turns"), ("_echo", "turns"),
+    ("features", "turns"), ("sizing", "curvature"), ("sizing", "gradation"),
     ("operations.collapse", "operations.guards"), ("operations.siblings", "operations.collapse"),
     ("operations.bisect", "operations.measure"), ("operations.collapse", "operations.measure"),
     ("operations.collapse", "operations.rings"), ("operations.siblings", "operations.rings"),

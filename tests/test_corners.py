@@ -6,12 +6,12 @@ import numpy as np
 import parts
 import pytest
 import zoo
-from structure import built, next_of
+from structure import built, links_of, mean_edge_of, next_of
 
 from remeshvec._types import NONE
 from remeshvec.corners import find_corners
 from remeshvec.creases import find_creases
-from remeshvec.curves import count_at_vertices, link_chains
+from remeshvec.curves import link_chains
 
 
 def corners_of(V, F, length, angle=None, hard=(), creases=None):
@@ -23,9 +23,9 @@ def corners_of(V, F, length, angle=None, hard=(), creases=None):
     is_hard = np.array([tuple(pair) in edges for pair in pairs])
     assert 2 * len(edges) == is_hard.sum() + (is_hard & (mesh.twin == NONE)).sum(), "no such edge"
     arrays = mesh.origin, mesh.twin, mesh.vertex_halfedge
-    is_feature, _ = find_creases(mesh.X, *arrays, is_hard, creases)
-    links = link_chains(*arrays, is_feature)
-    found = find_corners(mesh.X, *arrays, is_feature, links, angle)
+    is_feature, _ = find_creases(mesh.X, *arrays, is_hard, creases, mean_edge_of(mesh))
+    curves = link_chains(mesh.origin, mesh.twin, is_feature, len(mesh.X))
+    found = find_corners(mesh.X, mesh.origin, mesh.twin, curves, angle)
     assert found.shape == (len(mesh.X),) and found.dtype == np.bool_
     return np.flatnonzero(found)
 
@@ -102,19 +102,20 @@ def test_links_are_those_of_the_naive_twin(name, with_boundary):
     rng = np.random.default_rng(len(name))
     for share in (0.0, 0.05, 0.2, 0.5, 1.0):
         is_feature = marked(mesh, rng, share, with_boundary)
-        arrays = mesh.origin, mesh.twin
-        links = link_chains(*arrays, mesh.vertex_halfedge, is_feature)
         expected, count = naive_links(mesh, is_feature)
-        assert links.shape == (2, mesh.origin.size) and links.dtype == np.int32
-        assert np.array_equal(links, expected)
-        assert count_at_vertices(*arrays, is_feature, len(mesh.X)).tolist() == count
+        curves = link_chains(mesh.origin, mesh.twin, is_feature, len(mesh.X))
+        assert all(array.dtype == np.int32 for array in curves)
+        assert np.array_equal(curves.edges, np.flatnonzero(is_feature))
+        assert np.array_equal(links_of(mesh, is_feature), expected)
+        assert curves.degree.tolist() == count
 
 
 def test_links_of_a_closed_crease_run_both_ways():
     mesh = built(*zoo.cone(12), length=1.0)
     arrays = mesh.origin, mesh.twin, mesh.vertex_halfedge
-    is_feature, _ = find_creases(mesh.X, *arrays, np.zeros(mesh.origin.size, bool), "auto")
-    links = link_chains(*arrays, is_feature)
+    is_hard = np.zeros(mesh.origin.size, bool)
+    is_feature, _ = find_creases(mesh.X, *arrays, is_hard, "auto", mean_edge_of(mesh))
+    links = links_of(mesh, is_feature)
     rim = np.flatnonzero(is_feature)
     assert len(rim) == 24
     assert np.array_equal(links[1, links[0, rim]], rim)

@@ -6,9 +6,9 @@ import numpy as np
 import parts
 import pytest
 import zoo
-from structure import built, next_of
+from structure import built, mean_edge_of, next_of
 
-from remeshvec._echo import echoes_beside
+from remeshvec._echo import echo_cosines, echoes_beside
 from remeshvec._jit import kernel
 from remeshvec._types import NONE
 from remeshvec.creases import find_creases
@@ -22,7 +22,7 @@ def found_in(V, F, length, angle="auto", hard=()):
     is_hard = np.array([edge in hard for edge in edges])
     before = is_hard.copy()
     is_feature, counts = find_creases(
-        mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge, is_hard, angle
+        mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge, is_hard, angle, mean_edge_of(mesh)
     )
     assert is_feature.dtype == np.bool_ and np.array_equal(is_hard, before)
     inside = mesh.twin != NONE
@@ -182,9 +182,12 @@ def test_steps_and_ends_of_faces_are_no_echo(noise):
 
 
 @kernel
-def listen(X, origin, twin, normals, is_hard, edges, reach, echoes):
+def listen(X, origin, twin, normals, is_hard, edges, reach, turn, echoes):
+    quiet, loud = echo_cosines(turn)
     for k in range(len(edges)):
-        echoes[k] = echoes_beside(X, origin, twin, normals, is_hard, edges[k], reach)[0]
+        echoes[k] = echoes_beside(
+            X, origin, twin, normals, is_hard, edges[k], reach, quiet, loud, 2
+        )[0]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -213,7 +216,7 @@ def test_walks_go_straight_over_any_faces(seed):
     no_hard = np.zeros(mesh.origin.size, bool)
     for reach, expected in ((0.999, 0), (1.001, 1)):
         echoes = np.empty(len(edges))
-        listen(mesh.X, mesh.origin, mesh.twin, N, no_hard, edges, reach, echoes)
+        listen(mesh.X, mesh.origin, mesh.twin, N, no_hard, edges, reach, np.pi / 4, echoes)
         assert (echoes == expected).all()
 
 

@@ -8,11 +8,11 @@ import nonmanifold
 import numpy as np
 import pytest
 import zoo
-from structure import built, cut_open, draw, featured, next_of
+from structure import built, cut_open, draw, featured, links_of, next_of
 
 from remeshvec._jit import kernel
 from remeshvec._types import FIXED, NONE, SEAM
-from remeshvec.curves import count_at_vertices, link_chains
+from remeshvec.curves import link_chains
 from remeshvec.polyline import (
     closest_on_curve,
     find_siblings,
@@ -56,6 +56,17 @@ def place(mesh, h):
     return frozenset(tuple((mesh.X[v, :3] + 0.0).tolist()) for v in ends(mesh, h))
 
 
+def curves_of(mesh, is_feature):
+    return link_chains(mesh.origin, mesh.twin, is_feature, len(mesh.X))
+
+
+def names_of(mesh, is_feature):
+    """Names at half-edges, and the names."""
+    edges = np.flatnonzero(is_feature).astype(np.int32)
+    found = np.empty(mesh.origin.size, np.int32)
+    return found, name_edges(mesh.twin, edges, *siblings_of(mesh), found)
+
+
 def siblings_of(mesh):
     return find_siblings(mesh.X, mesh.origin, np.flatnonzero(mesh.twin == NONE).astype(np.int32))
 
@@ -67,7 +78,7 @@ def siblings_of(mesh):
 def test_links_are_loops_both_ways(name):
     mesh = built(*zoo.ZOO[name].make())
     open_ones = np.flatnonzero(mesh.twin == NONE)
-    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, mesh.twin == NONE)
+    links = links_of(mesh, mesh.twin == NONE)
     assert links.shape == (2, mesh.origin.size)
     assert (links[:, mesh.twin != NONE] == NONE).all()
     assert np.array_equal(links[1, links[0, open_ones]], open_ones)
@@ -77,7 +88,7 @@ def test_links_are_loops_both_ways(name):
 
 def test_closed_meshes_without_creases_have_no_links():
     mesh = built(*zoo.torus())
-    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, mesh.twin == NONE)
+    links = links_of(mesh, mesh.twin == NONE)
     assert (links == NONE).all()
 
 
@@ -85,13 +96,13 @@ def test_closed_meshes_without_creases_have_no_links():
 def test_links_join_where_two_edges_meet(name):
     """Every edge, in both directions: what comes next is the only other edge there, or nothing."""
     mesh, is_feature = features_of(name)
-    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, is_feature)
+    links = links_of(mesh, is_feature)
     edges = {frozenset(ends(mesh, h)) for h in np.flatnonzero(is_feature)}
     at = defaultdict(set)
     for edge in edges:
         for v in edge:
             at[v].add(edge)
-    count = count_at_vertices(mesh.origin, mesh.twin, is_feature, len(mesh.X))
+    count = link_chains(mesh.origin, mesh.twin, is_feature, len(mesh.X)).degree
     assert count.tolist() == [len(at[v]) for v in range(len(mesh.X))]
     for h in np.flatnonzero(is_feature):
         a, b = ends(mesh, h)
@@ -157,7 +168,8 @@ def test_edges_of_no_length_are_siblings_of_each_other_only():
 @pytest.mark.parametrize("name", CREASED + CUT)
 def test_an_edge_has_one_name_on_all_its_sides(name):
     mesh, is_feature = features_of(name)
-    found = name_edges(mesh.twin, is_feature, *siblings_of(mesh))
+    found, names = names_of(mesh, is_feature)
+    assert np.array_equal(names, np.unique(found[is_feature]))
     assert found.dtype == np.int32 and (found[~is_feature] == NONE).all()
     sides = defaultdict(list)
     for h in np.flatnonzero(is_feature).tolist():
@@ -179,12 +191,10 @@ def test_an_edge_has_one_name_on_all_its_sides(name):
 )
 def test_neighbours_share_an_end_that_is_no_corner(name, cornered):
     mesh, is_feature = features_of(name)
-    names = name_edges(mesh.twin, is_feature, *siblings_of(mesh))
-    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, is_feature)
+    names, edges = names_of(mesh, is_feature)
     corner = (mesh.kind == FIXED) & cornered
-    beside = join_edges(names, links, mesh.origin, corner)
+    beside = join_edges(names, curves_of(mesh, is_feature), mesh.origin, corner)
     assert beside.shape == (2, mesh.origin.size) and beside.dtype == np.int32
-    edges = np.unique(names[is_feature])
     assert (np.delete(beside, edges, axis=1) == NONE).all()
     at = defaultdict(set)  # on the sheet of the name: names at every vertex
     for h in np.flatnonzero(is_feature).tolist():
@@ -200,10 +210,10 @@ def test_neighbours_share_an_end_that_is_no_corner(name, cornered):
 def test_without_curves_nobody_has_neighbours():
     mesh = built(*zoo.torus())
     none = np.zeros(mesh.origin.size, bool)
-    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, none)
-    names = name_edges(mesh.twin, none, *siblings_of(mesh))
-    assert (names == NONE).all()
-    assert join_edges(names, links, mesh.origin, np.zeros(len(mesh.X), bool)).shape == (2, 0)
+    names, edges = names_of(mesh, none)
+    assert (names == NONE).all() and not len(edges)
+    corner = np.zeros(len(mesh.X), bool)
+    assert join_edges(names, curves_of(mesh, none), mesh.origin, corner).shape == (2, 0)
 
 
 # --- arcs ----------------------------------------------------------------------------------------
@@ -212,10 +222,9 @@ def test_without_curves_nobody_has_neighbours():
 def arcs_of(mesh):
     """Names, who follows whom, and arc lengths of a mesh with marked features."""
     is_feature = mesh.curve != NONE
-    names = name_edges(mesh.twin, is_feature, *siblings_of(mesh))
-    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, is_feature)
-    beside = join_edges(names, links, mesh.origin, mesh.kind == FIXED)
-    return np.unique(names[is_feature]), beside, measure_arcs(mesh.X, mesh.origin, names, beside)
+    names, edges = names_of(mesh, is_feature)
+    beside = join_edges(names, curves_of(mesh, is_feature), mesh.origin, mesh.kind == FIXED)
+    return edges, beside, measure_arcs(mesh.X, mesh.origin, edges, beside)
 
 
 def chains(edges, beside):
@@ -420,8 +429,8 @@ def test_a_vertex_stays_on_its_own_stretch():
     """A narrow slot: the other side is nearer, but far along the loop."""
     points = [[0, 0], [4, 0], [4, 3], [2.1, 3], [2.1, 1], [1.9, 1], [1.9, 3], [0, 3]]
     mesh, _, names = curves(*polygon(points, 0.1), 0.2)
-    links = link_chains(mesh.origin, mesh.twin, mesh.vertex_halfedge, mesh.twin == NONE)
-    beside = join_edges(mesh.curve, links, mesh.origin, np.zeros(len(mesh.X), bool))
+    rim = curves_of(mesh, mesh.twin == NONE)
+    beside = join_edges(mesh.curve, rim, mesh.origin, np.zeros(len(mesh.X), bool))
     at = mesh.X[mesh.origin[names], :2]
     start = names[np.abs(at - [2.1, 2.5]).sum(axis=1).argmin()]
     P = np.array([[1.97, 2.5, 0.0]])  # past the middle: 0.07 to the other side, 0.13 to its own
