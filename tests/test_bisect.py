@@ -5,12 +5,12 @@ import nonmanifold
 import numpy as np
 import pytest
 import zoo
+from holes import CLOSED, OPEN, few_long, holed, longest_edge, numbers, spotted, with_room
 from pieces import on_threads, shuffled
 from structure import (
     assert_on_reference,
     assert_same_bits,
     assert_valid,
-    blocks_of,
     built,
     copied,
     curve_edges,
@@ -24,58 +24,14 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import CURVE, DEAD, FIXED, FROZEN, HALTED, INNER, SEAM, Mesh
+from remeshvec._types import CURVE, DEAD, FIXED, FROZEN, HALTED, NONE, SEAM
 from remeshvec.edge_sets import make_blocks
 from remeshvec.halfedge import ends_of
 from remeshvec.operations import split as module
 from remeshvec.operations.bisect import bisect_edges
-from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
-from remeshvec.operations.measure import REMOVED, measure_edges
-from remeshvec.operations.split import ROOM, compact, split_long_edges
+from remeshvec.operations.measure import measure_edges
+from remeshvec.operations.split import split_long_edges
 from remeshvec.polyline import find_siblings
-
-OPEN = ["grid", "annulus", "planar_delaunay", "cylinder"]
-CLOSED = ["torus", "genus_2", "closed_cylinder", "l_prism", "icosphere"]
-
-
-def with_room(mesh, n_faces, n_vertices, rng=None):
-    """The mesh with dead faces and vertices at its end, whose other arrays hold anything."""
-    rng = rng or np.random.default_rng(0)
-    anything = lambda n: rng.integers(-5, 10**6, n).astype(np.int32)  # noqa: E731
-    dead = Mesh(
-        np.full(3 * n_faces, DEAD, np.int32),
-        anything(3 * n_faces),
-        anything(3 * n_faces),
-        anything(n_faces),
-        np.full(n_vertices, DEAD, np.int32),
-        anything(n_vertices),
-        rng.uniform(0.5, 2.0, (n_vertices, 4)),
-        rng.integers(0, 5, n_vertices).astype(np.uint8),
-        anything(n_vertices),
-    )
-    return Mesh(*(np.concatenate(pair) for pair in zip(mesh, dead, strict=True)))
-
-
-def spotted(name, seed=0, count=3):
-    """Mesh with features; short target lengths around some vertices, so that few edges are long."""
-    V, F = zoo.upsampled(*zoo.ZOO[name].make(), n=1, noise=0.2, seed=seed)
-    mesh = built(V, F, ordered=True)
-    reference = featured(mesh, 2 * longest_edge(V, F), feature_angle=40.0).reference
-    add_spots(mesh, zoo.mean_edge(V, F), seed, count)
-    return mesh, reference
-
-
-def longest_edge(V, F):
-    return max(naive.edge_length(V, e) for e in naive.edges(F))
-
-
-def add_spots(mesh, length, seed, count):
-    """Shorten the target lengths in the closed rings of some vertices."""
-    rng = np.random.default_rng(seed)
-    ring = naive.neighbours(faces_of(mesh))
-    for v in rng.choice(sorted(ring), min(count, len(ring)), replace=False).tolist():
-        around = [v, *sorted(ring[v])]
-        mesh.X[around, 3] = length * rng.uniform(0.4, 0.8, len(around))
 
 
 def assert_true(flags, mesh, blocks):
@@ -92,11 +48,6 @@ def bisect(mesh, blocks, longest=1.0, shortest=0.5, parallel=False):
     fresh = assert_true(flags, mesh, blocks)
     assert n_left == fresh.n_long
     return n_split, n_left
-
-
-def numbers(mesh):
-    """Live faces and vertices."""
-    return len(faces_of(mesh)), int((mesh.vertex_halfedge != DEAD).sum())
 
 
 # --- one at a time -------------------------------------------------------------------------------
@@ -235,6 +186,27 @@ def test_needles_end():
         assert not naive.long_edges(mesh.X[:, :3], faces_of(mesh), 1.0)
 
 
+def test_faces_that_end_up_behind_are_split_in_the_next_round():
+    """The new face lies before the old one, only it wants more, and only the face across says so."""
+    V = np.array([[0, 0, 0], [1.9, 0, 0], [0.45, 0.1, 0], [1, -1, 0]])
+    mesh = built(V, [[1, 2, 0], [1, 0, 3]])
+    mesh.X[3, 3] = 100.0
+    n = 12
+    dead = with_room(mesh, n, n)
+    order = np.r_[6 : 6 + 3 * n, :6]
+    shift = lambda h: np.where(h == NONE, NONE, h + 3 * n).astype(np.int32)  # noqa: E731
+    mesh = dead._replace(
+        origin=dead.origin[order],
+        twin=shift(dead.twin)[order],
+        curve=dead.curve[order],
+        source=np.zeros(n + 2, np.int32),
+        vertex_halfedge=np.r_[shift(mesh.vertex_halfedge), dead.vertex_halfedge[4:]],
+    )
+    assert_valid(mesh)
+    assert bisect(mesh, one_block(mesh)) == (2, 0)
+    assert_valid(mesh)
+
+
 def test_siblings_are_never_split_in_place():
     """All of a group must be, whatever room their blocks have."""
     mesh, source = cut_open(*nonmanifold.COMPLEXES["two_cubes"].make())
@@ -253,20 +225,6 @@ def test_siblings_are_never_split_in_place():
 
 
 # --- many blocks ---------------------------------------------------------------------------------
-
-
-def holed(name, seed, per_block, monkeypatch, count=6):
-    """Mesh in many blocks with the holes of collapses, room at their ends, and spots of short lengths."""
-    V, F = zoo.upsampled(*zoo.ZOO[name].make(), n=2, noise=0.3, seed=seed)
-    mesh = built(V, F, ordered=True)
-    L = zoo.mean_edge(V, F)
-    reference = featured(mesh, L, feature_angle=40.0).reference
-    mesh = compact(mesh, blocks_of(mesh, per_block, monkeypatch), False, ROOM)
-    limits = CollapseLimits(0.8, 1.5, 0.7, 0.5, False)
-    collapse_short_edges(mesh, make_blocks(mesh), limits, False)
-    mesh.X[:, 3] = 2 * longest_edge(mesh.X[:, :3], faces_of(mesh))
-    add_spots(mesh, L, seed, count)
-    return mesh, reference
 
 
 @pytest.mark.parametrize("per_block", [20, 60, 250])
@@ -339,11 +297,6 @@ def test_dead_elements_may_hold_anything():
 # --- as a part of `split_long_edges` -------------------------------------------------------------
 
 
-def few_long(name, seed=0):
-    mesh, reference = spotted(name, seed, 1)
-    return compact(mesh, one_block(mesh), False, 4.0), reference
-
-
 @pytest.mark.parametrize("name", [*OPEN, *CLOSED])
 def test_few_long_edges_are_split_in_place(name):
     """All of them at once, and the flags say afterwards what is short."""
@@ -384,74 +337,6 @@ def test_many_long_edges_are_not_split_in_place():
     refined, count = split_long_edges(mesh, one_block(mesh), 0.05, False)
     assert refined is not mesh and count > len(faces_of(mesh)) // 2
     assert_same_bits(mesh, before)
-
-
-# --- room ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("per_block", [16, 100, 10**6])
-@pytest.mark.parametrize("name", [*OPEN, *CLOSED])
-def test_compaction_is_that_of_the_twin(name, per_block, monkeypatch):
-    """Live elements in their order, bit for bit; room only where it is asked for."""
-    mesh, reference = holed(name, 0, 50, monkeypatch)
-    expected = packed(mesh)
-    blocks = blocks_of(mesh, per_block, monkeypatch)
-    before = copied(mesh)
-    done = compact(mesh, blocks, False)
-    assert_same_bits(done, expected)
-    assert_same_bits(mesh, before)
-    assert_on_reference(done, reference)
-    roomy = compact(mesh, blocks, False, 0.3)
-    assert_valid(roomy)
-    assert_same_bits(packed(roomy), expected)
-    free = [int(0.3 * n) for n in live_faces(mesh, blocks)]
-    assert numbers(roomy) == numbers(mesh)
-    assert len(roomy.origin) // 3 == numbers(mesh)[0] + sum(free)
-    assert len(roomy.X) == numbers(mesh)[1] + sum(n // 2 for n in free)
-    end = 0
-    for n, room in zip(live_faces(mesh, blocks), free, strict=True):
-        dead = roomy.origin.reshape(-1, 3)[end : end + n + room] == DEAD
-        assert not dead[:n].any() and dead[n:].all()
-        end += n + room
-    assert (roomy.kind[roomy.vertex_halfedge == DEAD] == INNER).all()
-    assert np.isfinite(roomy.X).all() and (roomy.X[:, 3] > 0).all()
-
-
-def live_faces(mesh, blocks):
-    alive = np.r_[0, np.cumsum(mesh.origin[::3] != DEAD)]
-    return np.diff(alive[blocks.face]).tolist()
-
-
-@pytest.mark.parametrize("per_block", [16, 10**6])
-@pytest.mark.parametrize("name", ["torus", "annulus"])
-def test_a_new_mesh_has_room_in_every_block(name, per_block, monkeypatch):
-    """For as many splits as are worth it."""
-    mesh, _ = holed(name, 0, 50, monkeypatch)
-    refined, count = split_long_edges(mesh, blocks_of(mesh, per_block, monkeypatch), 0.2, False)
-    assert count > 0
-    assert_valid(refined)
-    faces, vertices = numbers(refined)
-    assert ROOM * faces - len(mesh.origin) / per_block - 1 <= len(refined.source) - faces
-    assert len(refined.source) - faces <= ROOM * faces
-    assert (len(refined.X) - vertices) * 2 <= ROOM * faces
-    blocks = make_blocks(refined)
-    flags = measure_edges(refined, blocks, 0.2, 0.0, False)
-    assert flags.n_gone == len(refined.source) - faces
-    assert (flags.mask == REMOVED).sum() == flags.n_gone
-
-
-def test_compaction_forgets_garbage():
-    """Whatever dead elements held, a mesh with room is the same but for them."""
-    mesh, _ = spotted("genus_2")
-    for room in (0.0, 0.5):
-        done = [
-            compact(
-                with_room(mesh, 60, 40, np.random.default_rng(seed)), one_block(mesh), False, room
-            )
-            for seed in range(3)
-        ]
-        for other in done[1:]:
-            assert_same_bits(done[0], other)
 
 
 def test_curves_keep_their_vertices():

@@ -6,12 +6,14 @@ import naive
 import numpy as np
 import pytest
 import zoo
+from holes import with_room
 from structure import assert_same_bits, blocks_of, built, copied, half_edge, tree_of
 
 from remeshvec import edge_sets
-from remeshvec._types import Blocks
+from remeshvec._types import DEAD, Blocks
 from remeshvec.edge_sets import OWNED, REST, SHIFTED, list_range, per_stage_block, vertex_range
-from remeshvec.operations import collapse, flip, untangle
+from remeshvec.operations import bisect, collapse, flip, untangle
+from remeshvec.operations.measure import measure_edges
 
 
 @pytest.mark.parametrize("per_block", [4, 17, 50, 10_000])
@@ -157,6 +159,38 @@ def test_a_flip_owns_no_more_than_its_quad(outside):
     h = half_edge(mesh, new[0], new[1])
     assert flip_owned(mesh, all_but_the_last_vertex(mesh), h)
     half_edge(mesh, new[2], new[3])
+
+
+def bisect_owned(V, F, a, b):
+    """Split edge a-b in place; the block has all faces, the new vertex, and all old ones but the last."""
+    n, m = len(V), len(F)
+    mesh = with_room(built(V, F, length=100.0), 2, 1)
+    mesh.X[[a, b], 3] = 0.9 * naive.edge_length(V, (a, b))
+    order = np.r_[: n - 1, n, n - 1]  # its own inverse
+    columns = ("vertex_halfedge", "valence_excess", "X", "kind", "birth")
+    origin = np.where(mesh.origin == DEAD, DEAD, order[mesh.origin]).astype(np.int32)
+    mesh = mesh._replace(origin=origin, **{name: getattr(mesh, name)[order] for name in columns})
+    blocks = Blocks(np.array([0, m + 2, m + 2]), np.array([0, n, n + 1]))
+    mask = measure_edges(mesh, blocks, 1.0, 0.0, False).mask
+    done, left = np.zeros(2, np.int64), np.zeros(2, np.int64)
+    bisect._bisect(False, mesh, blocks, OWNED, 0.5, 0.0, mask, done, left)
+    assert done.any() != left.any()
+    return bool(done.any())
+
+
+def test_a_split_owns_the_four_vertices_of_its_quad():
+    """And no more: both faces, the new vertex and both new faces lie in the block in any case."""
+    for v in range(6):
+        V, F, new = with_last(*quad(), v)
+        assert bisect_owned(V, F, new[0], new[1]) == (v > 3)
+    for v in range(4):  # on the boundary: the three of its face
+        V, F, new = with_last(*two_faces(), v)
+        assert bisect_owned(V, F, new[0], new[1]) == (v > 2)
+
+
+def two_faces():
+    V = np.array([[-1, 0, 0], [1, 0, 0], [0, 0.9, 0], [2, 0.9, 0]])
+    return V, np.array([[0, 1, 2], [2, 1, 3]])
 
 
 def hill():

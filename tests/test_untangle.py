@@ -7,8 +7,11 @@ import pytest
 import zoo
 from structure import (
     assert_on_reference,
+    assert_same_bits,
     assert_valid,
+    blocks_of,
     built,
+    copied,
     faces_of,
     one_block,
     project,
@@ -99,6 +102,28 @@ def test_vertices_stay_on_the_surface_if_told_to():
     F = faces_of(mesh).astype(np.int64)
     squared, _, _ = igl.point_mesh_squared_distance(mesh.X[:, :3].copy(), V, F)
     assert np.sqrt(squared).max() < 1e-13
+
+
+@pytest.mark.parametrize("on_surface", [False, True])
+@pytest.mark.parametrize("per_block", [30, 10**6])
+@pytest.mark.parametrize("name", MESHES)
+def test_rounds_are_those_of_calls_that_look_everywhere(name, per_block, on_surface, monkeypatch):
+    """A ring that has not changed and was not improved would not be the next time."""
+    mesh, reference = rough(name)
+    one, two = copied(mesh), copied(mesh)
+    blocks = blocks_of(mesh, per_block, monkeypatch)
+    arguments = (blocks, reference.tree, on_surface, np.cos(np.radians(38.0)))
+    found = untangle_vertices(one, *arguments, 4, False)
+    moves = [untangle_vertices(two, *arguments, 1, False) for _ in range(4)]
+    assert found == sum(moves) and moves[1] > 0
+    assert_same_bits(one, two)
+
+
+def test_no_round_no_move():
+    mesh, reference = rough("torus")
+    before = mesh.X.copy()
+    assert untangled(mesh, reference, 60.0, rounds=0) == 0
+    assert np.array_equal(mesh.X, before)
 
 
 def test_nothing_to_do():
