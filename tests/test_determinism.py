@@ -12,7 +12,16 @@ import pytest
 import zoo
 from pieces import on_threads, shuffled
 from strict import all_modules
-from structure import assert_same_bits, assert_valid, blocks_of, copied, featured, locate, project
+from structure import (
+    assert_same_bits,
+    assert_valid,
+    blocks_of,
+    built,
+    copied,
+    featured,
+    locate,
+    project,
+)
 
 import remeshvec
 from remeshvec import _jit
@@ -108,6 +117,18 @@ def in_every_way(call):
 
 
 ORDERED: set[str] = set()  # kernels whose pieces were shuffled
+
+
+def test_creases_are_the_same_in_any_order():
+    V, F = zoo.upsampled(*zoo.torus(96, 48), noise=0.45)
+    one = built(*zoo.perturb(V, F, amount=0.02), length=0.01)
+    results = in_every_way(
+        lambda parallel: featured(copied(one), parallel=parallel, feature_angle="auto")
+    )
+    assert results[0].counts["dropped_noise"] > 100
+    for other in results[1:]:
+        assert other.counts == results[0].counts
+        same(tuple(results[0].reference), tuple(other.reference))
 
 
 def test_every_kernel_is_the_same_in_any_order(monkeypatch):
