@@ -1,0 +1,557 @@
+"""Threads: calls at once, processes, errors, ends; nobody waits for ever, nobody takes too much."""
+
+import hashlib
+import itertools
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+from pathlib import Path
+from pkgutil import walk_packages
+
+import numba
+import numpy as np
+import pytest
+import zoo
+
+import remeshvec
+from remeshvec import _jit, _threads, remesh
+
+ROOT = Path(__file__).resolve().parents[1]
+CORES = 4  # as the tests have it, whatever the machine says
+PATIENCE = 60.0  # seconds after which a call hangs
+
+needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="kernels are not compiled")
+
+
+HELPERS = _threads._Helpers()  # ours, because the library's own may be more than we want
+
+
+@pytest.fixture
+def pool(monkeypatch):
+    """Four cores."""
+    monkeypatch.setattr(_threads, "_helpers", HELPERS)
+    monkeypatch.setattr(_threads, "available_threads", lambda: CORES)
+    return HELPERS
+
+
+@pytest.fixture
+def all_parallel(monkeypatch, pool):
+    """Let small meshes have many blocks, and share them."""
+    monkeypatch.setattr("remeshvec.edge_sets.FACES_PER_BLOCK", 200)
+    monkeypatch.setattr("remeshvec.sweeps._PARALLEL_FACES", 0)
+    return pool
+
+
+def helper_threads():
+    return [thread for thread in threading.enumerate() if thread.name == "remeshvec"]
+
+
+def digest(result):
+    arrays = (result.V, result.F, result.birth_face, result.birth_barycentric)
+    return hashlib.sha256(b"".join(np.ascontiguousarray(x).tobytes() for x in arrays)).hexdigest()
+
+
+def at_once(*functions):
+    """Run functions in threads that start together; their results, or the first error."""
+    barrier = threading.Barrier(len(functions))
+
+    def run(function):
+        barrier.wait(PATIENCE)
+        return function()
+
+    executor = ThreadPoolExecutor(len(functions))
+    futures = [executor.submit(run, function) for function in functions]
+    try:
+        return [future.result(PATIENCE) for future in futures]
+    finally:
+        executor.shutdown(wait=False)
+
+
+def eventually(condition):
+    """Wait for what another thread is about to do."""
+    deadline = time.monotonic() + PATIENCE
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return condition()
+
+
+# -- the GIL --------------------------------------------------------------------------------------
+
+
+def kernels():
+    for info in walk_packages(remeshvec.__path__, "remeshvec."):
+        if info.name.rsplit(".", 1)[-1] not in ("__main__", "viz", "cli"):
+            found = vars(import_module(info.name)).values()
+            yield from (value for value in found if isinstance(value, _jit.kernel))
+
+
+@needs_jit
+def test_all_kernels_are_built_to_release_the_gil():
+    assert len(set(kernels())) > 20
+    assert all(kernel.compiled.targetoptions["nogil"] for kernel in kernels())
+
+
+@needs_jit
+def test_python_threads_run_while_kernels_do(monkeypatch):
+    """Nobody is ever asked for the GIL here, so that another thread counts only if it is let go of."""
+    ticks, during, done = [0], [], threading.Event()
+
+    def count():
+        while not done.is_set():
+            ticks[0] += 1
+            time.sleep(0)
+
+    def watched(self, *args):
+        serial = self.compiled
+        before = ticks[0]
+        serial(*args)
+        during.append(ticks[0] - before)
+
+    interval = sys.getswitchinterval()
+    counter = threading.Thread(target=count)
+    V, F = zoo.read(zoo.DATA / "pretzel.off")
+    remesh(V, F, threads=1)  # compiles
+    monkeypatch.setattr(
+        _jit._Threaded, "__call__", lambda self, _, *args: spans(self, watched, args)
+    )
+    deadline = time.monotonic() + PATIENCE
+    try:
+        sys.setswitchinterval(1000.0)
+        counter.start()
+        while not any(during) and time.monotonic() < deadline:
+            remesh(V, F, threads=1)
+    finally:
+        sys.setswitchinterval(interval)
+        done.set()
+        counter.join()
+    assert any(during)
+
+
+def spans(shared, run, args):
+    run(shared, (0, shared.count(*args)), *args)
+
+
+# -- calls at once --------------------------------------------------------------------------------
+
+
+def test_eight_calls_at_once_give_the_same_bits(monkeypatch, all_parallel):
+    monkeypatch.setattr("remeshvec.sweeps._PARALLEL_FACES", 2000)
+    meshes = [zoo.torus(48, 24), zoo.torus(24, 12), zoo.upsampled(*zoo.genus_2(), n=2, noise=0.2)]
+    cases = list(itertools.product(meshes, ("fast", "default")))
+    cases = (cases * 2)[:8]
+    assert {len(F) > 2000 for (_, F), _ in cases} == {True, False}
+
+    def call(V, F, preset, threads):
+        return digest(remesh(V, F, 0.8 * zoo.mean_edge(V, F), preset=preset, threads=threads))
+
+    alone = [call(*mesh, preset, 1) for mesh, preset in cases]
+    calls = [lambda c=c: call(*c[0], c[1], CORES) for c in cases]
+    assert at_once(*calls) == alone
+    assert at_once(*calls[:2]) == alone[:2]  # eight have one core each, or none
+    assert len(set(alone)) == 6
+    assert 0 < all_parallel.count < CORES
+    assert _threads._calls == 0
+
+
+class Crowd:
+    """Pieces that wait until as many as expected run at once; counts how many do."""
+
+    def __init__(self, expected):
+        self.expected = expected
+        self.changed = threading.Condition()
+        self.now = self.most = 0
+
+    def run(self, span):
+        with self.changed:
+            self.now += 1
+            self.most = max(self.most, self.now)
+            self.changed.notify_all()
+            self.changed.wait_for(lambda: self.most >= self.expected, 0.2 * PATIENCE)
+        time.sleep(0.001)  # for others, who should not come
+        with self.changed:
+            self.now -= 1
+
+
+def crowd_of(expected):
+    """Run a loop of which so many pieces should run at once; how many do."""
+    crowd = Crowd(expected)
+    _threads.share(crowd.run, 32, ())
+    return crowd.most
+
+
+@pytest.mark.parametrize("calls", [1, 2, 3, CORES, 2 * CORES])
+def test_calls_share_the_cores(monkeypatch, pool, calls):
+    helpers = _threads._Helpers()
+    monkeypatch.setattr(_threads, "_helpers", helpers)
+    expected = calls * max(1, CORES // calls)
+    crowd, inside = Crowd(expected), threading.Barrier(calls)
+
+    def call():
+        with _threads.thread_scope(CORES):
+            inside.wait(PATIENCE)
+            for _ in range(4):
+                _threads.share(crowd.run, 32, ())
+            inside.wait(PATIENCE)
+
+    at_once(*[call] * calls)
+    assert crowd.most == expected
+    assert helpers.count == max(0, expected - calls)
+
+
+def test_cores_are_given_up_and_taken_back(pool):
+    """A call that began alone shares with a second one from its next loop on, and gets all back."""
+    came, may_end = threading.Event(), threading.Event()
+
+    def second():
+        with _threads.thread_scope(CORES):
+            came.set()
+            may_end.wait(PATIENCE)
+
+    with _threads.thread_scope(CORES):
+        assert crowd_of(CORES) == CORES
+        other = threading.Thread(target=second)
+        other.start()
+        came.wait(PATIENCE)
+        assert crowd_of(CORES // 2) == CORES // 2
+        may_end.set()
+        other.join()
+        assert crowd_of(CORES) == CORES
+
+
+def test_a_call_takes_no_more_than_it_asked_for(pool):
+    for threads in (1, 2, 3, 100):
+        with _threads.thread_scope(threads) as may_run:
+            assert may_run == (threads > 1)
+            assert crowd_of(min(threads, CORES)) == min(threads, CORES)
+
+
+def test_every_piece_runs_once(pool):
+    for count, threads in itertools.product((1, 2, 7, 16, 100), (1, 2, 3, 4)):
+        seen = np.zeros(count, int)
+
+        def note(span, seen=seen):
+            seen[span[0] : span[1]] += 1
+
+        with _threads.thread_scope(threads):
+            _threads.share(note, count, ())
+        assert (seen == 1).all()
+
+
+def test_a_call_inside_a_callback(all_parallel):
+    V, F = zoo.torus(32, 16)
+    alone = digest(remesh(V, F, 0.15, threads=CORES))
+    inner = []
+
+    def callback(sweep, phase, count):
+        if (sweep, phase) == (1, "flip"):
+            inner.append(digest(remesh(V, F, 0.15, threads=CORES)))
+
+    assert digest(remesh(V, F, 0.15, threads=CORES, callback=callback)) == alone
+    assert inner == [alone]
+
+
+# -- errors ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [ValueError, MemoryError, KeyboardInterrupt, SystemExit])
+@pytest.mark.parametrize("where", ["helper", "caller"])
+def test_an_error_in_a_piece_reaches_the_caller(pool, kind, where):
+    caller = threading.current_thread()
+    raised, begun = threading.Event(), []
+
+    def fail(span):
+        begun.append(span)
+        if (threading.current_thread() is caller) == (where == "caller"):
+            raised.set()
+            raise kind("no")
+        raised.wait(PATIENCE)
+
+    with _threads.thread_scope(CORES):
+        with pytest.raises(kind, match="no"):
+            _threads.share(fail, 10_000, ())
+        assert crowd_of(CORES) == CORES  # all helpers are alive
+    assert pool.count == CORES - 1
+
+
+def test_nobody_begins_pieces_of_a_loop_that_failed(pool):
+    """Else they would change arrays that their caller has given up."""
+    caller = threading.current_thread()
+    failed, begun = threading.Event(), []
+
+    def fail(span):
+        if threading.current_thread() is caller:
+            raise ValueError
+        failed.wait(PATIENCE)
+        begun.append(span)
+
+    with _threads.thread_scope(CORES), pytest.raises(ValueError):
+        _threads.share(fail, 16, ())
+    failed.set()
+    time.sleep(0.05)
+    assert len(begun) <= CORES - 1
+
+
+def test_where_no_thread_can_be_started_the_caller_does_the_work(monkeypatch, all_parallel):
+    def refuse(self):
+        raise RuntimeError("can't start new thread")
+
+    V, F = zoo.torus(32, 16)
+    alone = digest(remesh(V, F, 0.15, threads=1))
+    helpers = _threads._Helpers()
+    monkeypatch.setattr(_threads, "_helpers", helpers)
+    monkeypatch.setattr(threading.Thread, "start", refuse)
+    assert digest(remesh(V, F, 0.15, threads=CORES)) == alone
+    assert helpers.count == 0
+    assert helpers.jobs.empty()  # nothing keeps the arrays alive
+
+
+# -- what helpers cost ----------------------------------------------------------------------------
+
+
+def test_helpers_are_started_once(all_parallel):
+    V, F = zoo.torus(12, 8)
+    with _threads.thread_scope(CORES):
+        crowd_of(CORES)
+    before = threading.enumerate()
+    for _ in range(200):
+        remesh(V, F, 0.4, preset="fast", iterations=1, threads=CORES)
+    assert threading.enumerate() == before
+    assert all_parallel.count == CORES - 1
+    assert eventually(all_parallel.jobs.empty)
+
+
+@pytest.mark.skipif(not hasattr(time, "pthread_getcpuclockid"), reason="no clock of a thread")
+def test_helpers_without_work_cost_nothing(pool):
+    with _threads.thread_scope(CORES):
+        crowd_of(CORES)
+    time.sleep(0.05)
+    clocks = [time.pthread_getcpuclockid(thread.ident) for thread in helper_threads()]
+    before = [time.clock_gettime(clock) for clock in clocks]
+    time.sleep(0.5)
+    spent = [time.clock_gettime(c) - b for c, b in zip(clocks, before, strict=True)]
+    assert len(spent) >= CORES - 1
+    assert max(spent) < 1e-3
+
+
+def test_arrays_are_let_go_of(pool):
+    """A helper that waits keeps nothing of the last loop."""
+    import weakref
+
+    array = np.zeros(10)
+
+    def wait(span, x):
+        time.sleep(0.001)
+
+    with _threads.thread_scope(CORES):
+        _threads.share(wait, 16, (array,))
+    alive = weakref.ref(array)
+    del array
+    assert eventually(lambda: alive() is None)
+
+
+# -- processes ------------------------------------------------------------------------------------
+
+COMMON = """
+import hashlib, json, multiprocessing, os, sys, threading, time
+import numpy as np
+from remeshvec import _jit, _threads, edge_sets, read_mesh, remesh
+V, F, _ = read_mesh("data/pretzel.off")
+
+def digest(threads=None, callback=None):
+    edge_sets.FACES_PER_BLOCK = 200
+    sys.modules["remeshvec.sweeps"]._PARALLEL_FACES = 0
+    r = remesh(V, F, preset="fast", iterations=2, threads=threads, callback=callback)
+    return hashlib.sha256(r.V.tobytes() + r.F.tobytes() + r.birth_barycentric.tobytes()).hexdigest()
+
+def helpers():
+    return sum(thread.name == "remeshvec" for thread in threading.enumerate())
+
+def call(_):
+    return digest(), helpers()
+"""
+
+
+def in_a_process(tmp_path, text, *paths, limit=CORES, **env):
+    """Run a script in the root; what it prints last, as JSON."""
+    (tmp_path / "script.py").write_text(COMMON + text)
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *map(str, paths)]), **env}
+    env.pop("NUMBA_NUM_THREADS", None)
+    if limit:
+        env["NUMBA_NUM_THREADS"] = str(limit)
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "script.py")],
+        env=env,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+ALONE = """
+found = {"available": _threads.available_threads()}
+for threads in (1, 2, None):
+    found[str(threads)] = [digest(threads), helpers()]
+print(json.dumps(found))
+"""
+
+
+def test_helpers_start_with_the_first_call_that_shares(tmp_path):
+    """None for one thread; as many as Numba's limit allows; and the process ends while they wait."""
+    found = in_a_process(tmp_path, ALONE, limit=3)
+    assert found["available"] == 3
+    assert [found[threads][1] for threads in ("1", "2", "None")] == [0, 1, 2]
+    assert len({found[threads][0] for threads in ("1", "2", "None")}) == 1
+
+
+CHILDREN = """
+from concurrent.futures import ProcessPoolExecutor
+
+def fork_and_go_on(sweep, phase, count):
+    # The child goes on with the call, makes another one, and says what came out.
+    global child, pipe
+    if child is None and phase == "flip":
+        reader, writer = os.pipe()
+        child = os.fork()
+        pipe = reader if child else writer
+        os.close(writer if child else reader)
+
+child = pipe = None
+if __name__ == "__main__":
+    found = {"parent": [digest(1), 0], "shared": call(0)}
+    for method in multiprocessing.get_all_start_methods():
+        context = multiprocessing.get_context(method)
+        with ProcessPoolExecutor(1, context) as executor:
+            found[method] = next(executor.map(call, range(1)))
+    if hasattr(os, "fork"):
+        inside = digest(callback=fork_and_go_on)
+        if child == 0:
+            os.write(pipe, json.dumps([inside, *call(0)]).encode())
+            os._exit(0)
+        inside_child, again, count = json.loads(os.read(pipe, 1000))
+        os.waitpid(child, 0)
+        found["fork in a call"], found["and after it"] = [inside, 3], [inside_child, 3]
+        found["in its child"] = [again, count]
+    print(json.dumps(found))
+"""
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_children_share_their_calls_too(tmp_path):
+    """Forked after a call that did, inside of one, or started anew."""
+    found = in_a_process(tmp_path, CHILDREN)
+    assert len({digest for digest, _ in found.values()}) == 1, found
+    assert all(helpers == CORES - 1 for name, (_, helpers) in found.items() if name != "parent")
+    assert "spawn" in found
+
+
+JOBS = """
+import joblib
+
+if __name__ == "__main__":
+    found = [[digest(1), 0], call(0)]
+    for backend in ("loky", "threading"):
+        jobs = (joblib.delayed(call)(k) for k in range(4))
+        found += joblib.Parallel(n_jobs=2, backend=backend)(jobs)
+    print(json.dumps([found, joblib.cpu_count()]))
+"""
+
+
+def test_joblib(tmp_path):
+    joblib = pytest.importorskip("joblib")
+    folder = Path(joblib.__file__).parents[1]
+    found, cores = in_a_process(tmp_path, JOBS, folder, limit=None)
+    assert len(found) == 10
+    assert len({digest for digest, _ in found}) == 1
+    # joblib lets each of its processes have a part of the cores, and tells Numba.
+    assert max(helpers for _, helpers in found[2:6]) < max(cores // 2, 1)
+
+
+INTERRUPTED = """
+import _thread
+expected = digest(1)
+caught = 0
+for k in range(20):
+    timer = threading.Timer(0.001 * k, _thread.interrupt_main)
+    try:
+        timer.start()
+        digest()
+        timer.join()
+    except KeyboardInterrupt:
+        caught += 1
+print(json.dumps([caught, digest() == expected, helpers()]))
+"""
+
+
+def test_calls_can_be_interrupted(tmp_path):
+    caught, is_same, helpers = in_a_process(tmp_path, INTERRUPTED)
+    assert caught == 20
+    assert is_same
+    assert helpers == CORES - 1
+
+
+BUSY = """
+begun = threading.Event()
+
+def for_ever():
+    while True:
+        digest(callback=lambda *_: begun.set())
+
+for _ in range(2):
+    threading.Thread(target=for_ever, daemon=True).start()
+begun.wait()
+time.sleep(0.05)
+print(helpers(), flush=True)
+"""
+
+
+def test_a_process_ends_while_others_of_its_threads_remesh(tmp_path):
+    assert 0 < in_a_process(tmp_path, BUSY) < CORES
+
+
+# -- compilation ----------------------------------------------------------------------------------
+
+COMPILED = """
+@_jit.threaded(lambda x: len(x))
+def double(pieces, x):
+    for i in range(pieces[0], pieces[1]):
+        x[i] *= 2.0
+
+arrays = [np.arange(1000.0) for _ in range(8)]
+barrier = threading.Barrier(len(arrays))
+
+def run(x):
+    barrier.wait()
+    with _threads.thread_scope(4):
+        double(True, x)
+
+threads = [threading.Thread(target=run, args=(x,)) for x in arrays]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+same = all((x == 2.0 * np.arange(1000.0)).all() for x in arrays)
+print(json.dumps([bool(same), len(double.compiled.overloads)]))
+"""
+
+
+@needs_jit
+def test_threads_and_processes_that_compile_at_once(tmp_path):
+    """On an empty cache, which they fill together."""
+    cache = tmp_path / "cache"
+
+    def run():
+        return in_a_process(tmp_path, COMPILED, NUMBA_CACHE_DIR=str(cache))
+
+    assert at_once(run, run) == [[True, 1]] * 2
+    assert run() == [True, 1]
+    assert len(list(cache.rglob("*.nbi"))) == 1
