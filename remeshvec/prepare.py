@@ -47,6 +47,7 @@ def prepare(V: FloatArray, F: NDArray[Any], parallel: bool) -> Prepared:
     parallel : bool
         Let threads share the work; the result is the same.
     """
+    # Kernels would be compiled once more for arrays that are read-only or not aligned.
     V, F = (array if array.flags.behaved else array.copy() for array in (V, F))
     F32, low, high, n_repeated = survey(V, F, parallel)
     frame = _make_frame(low, high)

@@ -6,9 +6,12 @@ import topology
 import zoo
 from hypothesis import example, given
 from hypothesis import strategies as st
+from pieces import shuffled
 from structure import (
     assert_on_reference,
+    assert_same_bits,
     assert_valid,
+    copied,
     faces_of,
     featured,
     locate,
@@ -23,13 +26,14 @@ from remeshvec.edge_sets import make_blocks
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.flip import FlipLimits, flip_edges
+from remeshvec.operations.measure import measure_edges
 from remeshvec.operations.project import read_lengths
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.siblings import collapse_siblings
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
 from remeshvec.operations.unfold import undo_folds
-from remeshvec.operations.untangle import untangle_vertices
+from remeshvec.operations.untangle import approach_vertices, untangle_vertices
 from remeshvec.polyline import find_siblings
 from remeshvec.prepare import prepare
 
@@ -53,6 +57,9 @@ OPTIONS = st.fixed_dictionaries(
         "stiffness": st.sampled_from([0.0, 20.0, 80.0]),
         "project": st.booleans(),
         "fit": st.booleans(),
+        "passes": st.integers(1, 3),
+        "rounds": st.integers(0, 3),
+        "room": st.sampled_from([0.0, 0.125, 1.0]),
         "per_block": st.sampled_from([5, 24, 100, 10**6]),
     }
 )
@@ -96,13 +103,17 @@ def wishes(F, controls):
 
 
 class Phases:
-    """The phases in the order of a sweep, with all arrays checked after each."""
+    """The phases in any order, with all arrays checked after each.
+
+    Each runs twice, the second time with its blocks in some other order: the bits must be the same.
+    """
 
     def __init__(self, V, F, length, options, controls, patch):
         patch.setattr("remeshvec.edge_sets.FACES_PER_BLOCK", options["per_block"])
         prepared = prepare(V, F, False)
         self.o = options
         self.mesh = mesh = prepared.mesh
+        self.blocks = make_blocks(mesh)
         self.slits = bool(prepared.dirt.keys() & {"non_manifold_edges", "inconsistent_edges"})
         mesh.X[:, 3] = length * prepared.scale
         if controls["varies"]:
@@ -114,10 +125,29 @@ class Phases:
         self.shape = None if self.slits else shape_of(faces_of(mesh))
         self.corners = held(mesh)
         self.sheets = set(self.seams().values())
+        self.before = mesh.X.copy()
+        self.limits = CollapseLimits(
+            options["collapse"],
+            options["split"],
+            cosine(options["foldover"]),
+            options["quadric_reach"],
+            options["sliver_check"],
+        )
         self.check("prepare")
 
+    def run(self, name, phase):
+        """Run ``phase(mesh, parallel)``, which changes the mesh or returns another one."""
+        other, blocks = copied(self.mesh), self.blocks
+        found = phase(self.mesh, False) or self.mesh
+        with shuffled(len(name)):
+            again = phase(other, True) or other
+        assert_same_bits(found, again)
+        if found is not self.mesh:
+            self.mesh, blocks = found, make_blocks(found)
+        self.blocks = blocks
+        self.check(name)
+
     def check(self, phase):
-        self.blocks = make_blocks(self.mesh)
         try:
             assert_valid(self.mesh, slits=self.slits)
             assert_on_reference(self.mesh, self.reference)
@@ -134,73 +164,94 @@ class Phases:
     def seams(self):
         """Number of sheets at every edge on a seam, by its place."""
         found = {}
-        for h in self.on_seams().tolist():
+        for h in on_seams(self.mesh).tolist():
             ends = self.mesh.origin[[h, next_of(h)]]
             edge = frozenset((self.mesh.X[v, :3] + 0.0).tobytes() for v in ends)
             found[edge] = found.get(edge, 0) + 1
         return found
 
-    def on_seams(self):
-        alive = self.mesh.origin != DEAD
-        return np.flatnonzero((self.mesh.curve >= SEAM) & alive).astype(np.int32)
-
-    def siblings(self):
-        return find_siblings(self.mesh.X, self.mesh.origin, self.on_seams())
-
     def split(self):
+        """Rounds, whose flags stay true of a mesh that is split in place."""
         for _ in range(12):
-            siblings = self.siblings() if self.slits else None
-            self.mesh, count = split_long_edges(
-                self.mesh, self.blocks, self.o["split"], False, siblings
-            )
-            self.check("split")
-            if not count:
+            size = len(self.mesh.X), (self.mesh.vertex_halfedge != DEAD).sum()
+            self.run("split", self.one_round)
+            if size == (len(self.mesh.X), (self.mesh.vertex_halfedge != DEAD).sum()):
                 return
 
+    def one_round(self, mesh, parallel):
+        siblings = find_siblings(mesh.X, mesh.origin, on_seams(mesh)) if self.slits else None
+        longest, shortest = self.o["split"], self.o["collapse"]
+        flags = measure_edges(mesh, self.blocks, longest, shortest, parallel)
+        refined, _ = split_long_edges(mesh, self.blocks, longest, parallel, siblings, flags)
+        if refined is mesh:
+            fresh = measure_edges(mesh, self.blocks, longest, shortest, parallel)
+            assert np.array_equal(flags.mask, fresh.mask) and fresh.n_long == 0
+        return refined
+
     def collapse(self):
-        o = self.o
-        limits = CollapseLimits(
-            o["collapse"], o["split"], cosine(o["foldover"]), o["quadric_reach"], o["sliver_check"]
-        )
-        collapse_short_edges(self.mesh, self.blocks, limits, False)
-        self.check("collapse")
+        self.run("collapse", self.collapse_once)
         if self.slits:
-            collapse_siblings(self.mesh, *self.siblings(), limits)
-            self.check("collapse of siblings")
+            siblings = find_siblings(self.mesh.X, self.mesh.origin, on_seams(self.mesh))
+            self.run("siblings", lambda m, p: void(collapse_siblings(m, *siblings, self.limits)))
+
+    def collapse_once(self, mesh, parallel):
+        """With the flags that are known, and without."""
+        other = copied(mesh)
+        longest, shortest = self.limits.longest, self.limits.shortest
+        flags = measure_edges(mesh, self.blocks, longest, shortest, parallel)
+        tallies = [
+            collapse_short_edges(m, self.blocks, self.limits, parallel, f)
+            for m, f in ((mesh, flags), (other, None))
+        ]
+        assert np.array_equal(*tallies)
+        assert_same_bits(mesh, other)
 
     def flip(self):
         o = self.o
         limits = FlipLimits(cosine(o["flip_normal"]), o["delaunay_ties"], o["sliver_check"])
-        for _ in range(2):
-            flip_edges(self.mesh, self.blocks, limits, False)
-            self.check("flip")
+        for passes in (1, o["passes"]):
+            self.run("flip", lambda m, p, n=passes: void(flip_edges(m, self.blocks, limits, p, n)))
 
     def relax(self):
-        before = self.mesh.X.copy()
-        slide_vertices(self.mesh, self.blocks, self.reference, False)
-        self.check("slide")
-        relax_vertices(self.mesh, self.blocks, self.o["stiffness"], False)
-        self.check("relax")
+        self.before = self.mesh.X.copy()
+        self.run("slide", lambda m, p: slide_vertices(m, self.blocks, self.reference, p))
+        self.run("relax", lambda m, p: relax_vertices(m, self.blocks, self.o["stiffness"], p))
         if self.o["project"]:
-            project(self.mesh, self.reference, self.blocks)
-            self.check("project")
-        undo_folds(self.mesh, self.blocks, before, False)
-        self.check("unfold")
-        read_lengths(self.mesh, self.blocks, self.reference, False)
-        self.check("read lengths")
+            self.run("project", lambda m, p: project(m, self.reference, self.blocks, p))
+        self.run("unfold", lambda m, p: void(undo_folds(m, self.blocks, self.before, p)))
+        self.run("lengths", lambda m, p: read_lengths(m, self.blocks, self.reference, p))
+
+    def pack(self):
+        """Close the holes, and leave room or none."""
+        self.run("compact", lambda m, p: compact(m, self.blocks, p, self.o["room"]))
+
+    def untangle(self):
+        tree, o = self.reference.tree, self.o
+        arguments = (self.blocks, tree, o["project"], cosine(42), o["rounds"])
+        self.run("untangle", lambda m, p: void(untangle_vertices(m, *arguments, p)))
+
+    def approach(self):
+        away = 0.05 * float(self.mesh.X[:, 3].min())
+        arguments = (self.blocks, self.reference.tree, self.o["project"], 1 / 3, away)
+        self.run("approach", lambda m, p: void(approach_vertices(m, *arguments, p)))
 
     def finish(self):
-        self.mesh = compact(self.mesh, self.blocks, False)
-        self.check("compact")
-        tree = self.reference.tree
-        untangle_vertices(self.mesh, self.blocks, tree, self.o["project"], cosine(42), 2, False)
-        self.check("untangle")
+        self.run("compact", lambda m, p: compact(m, self.blocks, p))
+        self.untangle()
         if self.o["fit"]:
-            fit_vertices(self.mesh, self.blocks, tree, 0.2, False)
-            self.check("fit")
+            tree = self.reference.tree
+            self.run("fit", lambda m, p: fit_vertices(m, self.blocks, tree, 0.2, p))
         weights = locate(self.mesh, self.reference, self.blocks)
         self.check("locate")
         assert weights.min() >= -1e-12 and weights.sum(axis=1) == pytest.approx(1)
+
+
+def void(_):
+    """Return nothing, for phases that count."""
+
+
+def on_seams(mesh):
+    return np.flatnonzero((mesh.curve >= SEAM) & (mesh.origin != DEAD)).astype(np.int32)
 
 
 def held(mesh):
@@ -209,17 +260,17 @@ def held(mesh):
     return sorted((mesh.X[v, :3].tobytes(), int(mesh.birth[v])) for v in fixed)
 
 
-def run(mesh, options, controls=PLAIN, sweeps=2):
+SWEEP = ["split", "collapse", "flip", "relax"]
+
+
+def run(mesh, options, controls=PLAIN, steps=(*SWEEP, *SWEEP)):
     V, F = zoo.ZOO[mesh["name"]].make()
     length = mesh["factor"] * zoo.mean_edge(V, F)
     V, F = zoo.perturb(V, F, mesh["amount"], mesh["seed"])
     with pytest.MonkeyPatch.context() as patch:
         phases = Phases(V, F, length, options, controls, patch)
-        for _ in range(sweeps):
-            phases.split()
-            phases.collapse()
-            phases.flip()
-            phases.relax()
+        for step in steps:
+            getattr(phases, step)()
         phases.finish()
 
 
@@ -233,6 +284,14 @@ def test_every_phase_keeps_curves_and_what_is_held(mesh, options, controls):
     run(mesh, options, controls)
 
 
+STEPS = st.lists(st.sampled_from([*SWEEP, "pack", "untangle", "approach"]), max_size=10)
+
+
+@given(MESHES, OPTIONS, CONTROLS, STEPS)
+def test_phases_in_any_order(mesh, options, controls, steps):
+    run(mesh, options, controls, steps)
+
+
 @pytest.mark.parametrize("angle", [None, 40.0])
 @pytest.mark.parametrize("name", [*zoo.TIDY, *zoo.DIRTY])
 def test_every_shape_through_every_phase(name, angle):
@@ -240,10 +299,11 @@ def test_every_shape_through_every_phase(name, angle):
     options = {
         "split": 4 / 3, "collapse": 0.8, "foldover": 60.0, "quadric_reach": 0.5, "sliver_check": False,
         "flip_normal": 60.0, "delaunay_ties": True, "stiffness": 20.0,
-        "project": True, "fit": True, "per_block": 24,
+        "project": True, "fit": True, "passes": 2, "rounds": 2, "room": 0.5, "per_block": 24,
     }  # fmt: skip
     mesh = {"name": name, "amount": 0.15, "seed": 1, "factor": 0.8}
-    run(mesh, options, {**PLAIN, "feature_angle": angle, "varies": angle is not None})
+    controls = {**PLAIN, "feature_angle": angle, "varies": angle is not None}
+    run(mesh, options, controls, [*SWEEP, "pack", *SWEEP])
 
 
 CALLS = st.fixed_dictionaries(
