@@ -176,6 +176,12 @@ def test_points_that_look_alike_are_not_welded():
     assert weld_vertices(V, np.arange(200)).tolist() == expected
 
 
+def some_turned(F, share, seed=0):
+    """Faces, a share of them with corners 1 and 2 swapped, and which."""
+    which = np.random.default_rng(seed).random(len(F)) < share
+    return np.where(which[:, None], F[:, [0, 2, 1]], F), which
+
+
 def dirty_meshes():
     """Many kinds of dirt at once."""
     rng = np.random.default_rng(0)
@@ -226,12 +232,6 @@ def test_any_array_will_do():
 
 
 # --- windings ------------------------------------------------------------------------------------
-
-
-def some_turned(F, share, seed=0):
-    """Faces, a share of them with corners 1 and 2 swapped, and which."""
-    which = np.random.default_rng(seed).random(len(F)) < share
-    return np.where(which[:, None], F[:, [0, 2, 1]], F), which
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3])

@@ -1,4 +1,4 @@
-"""Twins: pairs, fans and counts as sets and lists give them, for any faces, in any order of the pieces."""
+"""Twins: pairs, fans and counts as sets and lists give them, for any faces and order of the pieces."""
 
 import time
 from collections import defaultdict
