@@ -205,8 +205,7 @@ def remesh(
     with compile_notice(), thread_scope(options.threads) as may_run:
         sweeps = Sweeps(options, watch, may_run, callback)
         with watch.time("build"):
-            # On one thread: shared among several, it was seen to fail on small dirty meshes.
-            prepared = prepare(vertices, faces, False)
+            prepared = prepare(vertices, faces, sweeps.is_parallel(len(faces)))
         sweeps.scale = prepared.scale
         sweeps.gradation = sizing.gradation
         if isinstance(L, Adaptive):

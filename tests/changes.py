@@ -27,6 +27,9 @@ def upsampled(
     """
     import igl
 
+    E = np.vstack([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    # libigl writes out of bounds where two faces run an edge the same way.
+    assert len(np.unique(E, axis=0)) == len(E), "only oriented manifolds can be upsampled"
     for _ in range(n):
         V, F = igl.upsample(V, F)
     N = np.nan_to_num(igl.per_vertex_normals(V, F))

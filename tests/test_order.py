@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 import zoo
+from pieces import on_threads, shuffled
 
-from remeshvec.order import order_mesh
+from remeshvec.order import order_mesh, survey
 
 
 def ordered(V, F, parallel=False):
@@ -49,7 +50,46 @@ def test_flat_and_far_input(place):
         assert sorted(result.face_source.tolist()) == list(range(len(F)))
 
 
-def test_parallel_is_the_same():
+def scattered():
+    """Nearly all in one cell of the curve, faces and vertices in no order, some in the same place."""
     V, F = zoo.icosphere(3)
-    for one, two in zip(ordered(V, F), ordered(V, F, True), strict=True):
-        assert one.tobytes() == two.tobytes()
+    V = np.vstack([V * 1e-6, [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]], V * 1e-6])
+    F = np.vstack([F, [[642, 643, 644]], F + 645])
+    rng = np.random.default_rng(0)
+    new = rng.permutation(len(V))
+    return V[np.argsort(new)], new[F][rng.permutation(len(F))]
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: zoo.icosphere(3), lambda: zoo.grid(30, 30), zoo.triangle, scattered]
+)
+def test_threads_give_the_same_order(make):
+    V, F = make()
+    one = ordered(V, F)
+    others = []
+    for threads in (1, 2, 3, 40):
+        with on_threads(threads):
+            others.append(ordered(V, F, True))
+    with on_threads(4), shuffled():
+        others.append(ordered(V, F, True))
+    for other in others:
+        for x, y in zip(one, other, strict=True):
+            assert x.tobytes() == y.tobytes()
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_survey(dtype, parallel):
+    V, F = zoo.grid()
+    V = np.vstack([V, [[np.nan, -1e300, 1e300]]])  # no face uses it
+    F = np.vstack([F, [[0, 0, 1], [3, 3, 3]]]).astype(dtype)
+    faces, low, high, repeated = survey(V, F, parallel)
+    assert faces.dtype == np.int32 and np.array_equal(faces, F) and not np.shares_memory(faces, F)
+    assert np.array_equal(low, V[:-1].min(axis=0)) and np.array_equal(high, V[:-1].max(axis=0))
+    assert repeated == 2
+
+
+def test_a_box_has_no_negative_zeros():
+    V = np.array([[-0.0, 0.0, -0.0], [1.0, -0.0, -0.0], [0.0, -1.0, -0.0]])
+    _, low, high, _ = survey(V, np.array([[0, 1, 2]]), False)
+    assert not np.signbit(np.concatenate([low[[0, 2]], high])).any()

@@ -4,10 +4,16 @@ import nonmanifold
 import numpy as np
 import pytest
 import zoo
-from structure import assert_valid, faces_of, shape_of
+from pieces import on_threads, shuffled
+from structure import assert_same_bits, assert_valid, faces_of, shape_of
 
-from remeshvec import MeshInputError
-from remeshvec.clean import drop_degenerate_faces, drop_duplicate_faces, weld_vertices
+from remeshvec import MeshInputError, _jit, order
+from remeshvec.clean import (
+    _WEIGHTS,
+    drop_degenerate_faces,
+    drop_duplicate_faces,
+    weld_vertices,
+)
 from remeshvec.lengths import measure
 from remeshvec.prepare import prepare
 
@@ -150,13 +156,91 @@ def test_cleaning_by_hand():
     assert weld_vertices(V, np.array([0, 1])) is None
 
 
-# --- windings ------------------------------------------------------------------------------------
+def test_only_candidates_are_compared():
+    F = np.array([[0, 1, 2], [2, 1, 0], [3, 4, 5], [4, 5, 3], [1, 2, 0]], np.int32)
+    assert drop_duplicate_faces(F).tolist() == [0, 2]
+    assert drop_duplicate_faces(F, np.array([4, 1, 0])).tolist() == [0, 2, 3]
+    assert drop_duplicate_faces(F, np.array([0, 2])) is None
+
+
+def test_points_that_look_alike_are_not_welded():
+    """Points are compared by one sum of their coordinates first."""
+    V = np.array([[_WEIGHTS[0], 0, 0], [0, 1.0, 0], [_WEIGHTS[0], 0, 0], [0, 1.0, 0], [0, -0.0, 1]])
+    assert weld_vertices(V, np.arange(5)).tolist() == [0, 1, 0, 1, 4]
+    assert weld_vertices(V, np.array([0, 1, 4])) is None
+    assert weld_vertices(V, np.array([3, 2, 1])).tolist() == [0, 3, 2, 3, 4]
+    V = np.random.default_rng(0).integers(0, 3, (200, 3)).astype(float)
+    V[V == 0] *= np.random.default_rng(1).choice([-1, 1], (V == 0).sum())
+    first = {}
+    expected = [first.setdefault(tuple(p), k) for k, p in enumerate(V.tolist())]
+    assert weld_vertices(V, np.arange(200)).tolist() == expected
 
 
 def some_turned(F, share, seed=0):
     """Faces, a share of them with corners 1 and 2 swapped, and which."""
     which = np.random.default_rng(seed).random(len(F)) < share
     return np.where(which[:, None], F[:, [0, 2, 1]], F), which
+
+
+def dirty_meshes():
+    """Many kinds of dirt at once."""
+    rng = np.random.default_rng(0)
+    shapes = {
+        "torus": zoo.torus(24, 12),
+        "annulus": zoo.annulus(24, 6),
+        "moebius": zoo.moebius(30, 6),
+        "sheet": zoo.thin_sheet(),
+        "discs": nonmanifold.half_discs(),
+        "book": nonmanifold.book(),
+        "bubbles": nonmanifold.double_bubble(20, 8),
+    }
+    for name, (V, F) in shapes.items():
+        yield f"{name} turned", V, some_turned(F, 0.3)[0]
+        yield f"{name} soup", V[F].reshape(-1, 3), np.arange(3 * len(F)).reshape(-1, 3)
+        again = rng.integers(0, len(F), 20)
+        yield f"{name} twice", V, rng.permutation(np.vstack([F, F[again][:, ::-1], F[again]]))
+        G = F.copy()
+        G[again, rng.integers(0, 3, 20)] = rng.integers(0, len(V), 20)
+        yield f"{name} tangled", np.vstack([V, [[np.nan, 0, 0]]]), rng.permutation(G)
+        yield f"{name} in parts", V, F[rng.random(len(F)) < 0.5]
+
+
+DIRTY = list(dirty_meshes())
+
+
+@pytest.mark.parametrize(("name", "V", "F"), DIRTY, ids=[name for name, _, _ in DIRTY])
+def test_threads_give_the_same_bits(name, V, F):
+    one = prepare(V, F, False)
+    with on_threads(3):
+        others = [prepare(V, F, True)]
+    with on_threads(3), shuffled():
+        others.append(prepare(V, F, True))
+    for other in others:
+        assert_same_bits(one.mesh, other.mesh)
+        for x, y in zip(one[1:5], other[1:5], strict=True):
+            assert (x is None) == (y is None) and (x is None or np.array_equal(x, y))
+        assert one.dirt == other.dirt and list(one.dirt) == list(other.dirt)
+    one.mesh.X[:, 3] = 1.0
+    assert_valid(one.mesh, slits=True)
+    assert_in_place(one, V, F)
+
+
+def test_any_array_will_do():
+    """Read-only ones, and faces of 32 bits, are neither changed nor compiled for."""
+    V, F = zoo.torus()
+    one = prepare(V, F, False)
+    kernels = [value for value in vars(order).values() if isinstance(value, _jit.kernel)]
+    before = [len(kernel.compiled.signatures) for kernel in kernels if kernel is not order._survey]
+    for dtype in (np.int32, np.int64):
+        fixed = V.copy(), F.astype(dtype)
+        for array in fixed:
+            array.setflags(write=False)
+        assert_same_bits(prepare(*fixed, False).mesh, one.mesh)
+    after = [len(kernel.compiled.signatures) for kernel in kernels if kernel is not order._survey]
+    assert before == after
+
+
+# --- windings ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3])
