@@ -2,12 +2,13 @@
 
 Two operations conflict when their footprints share a vertex (flip: the four vertices of the quad;
 collapse: the closed one-rings of both ends; moving a vertex: its closed one-ring). The arrays are
-cut into blocks whose number depends on the size of the mesh only, and a phase runs three stages:
+cut into blocks whose number depends on the size of the mesh only, and a phase runs in stages:
 
 * ``OWNED``: a block takes the candidates whose whole footprint lies in its own vertex range. Sets
   of different blocks cannot conflict: blocks run in parallel, each in order, in place.
 * ``SHIFTED``: the same over blocks shifted by half a block, for what straddled a border.
-* ``REST``: the few that are left, on one thread.
+* ``SHIFTED + i``: the same over groups of 4^i blocks, for the few that lie where the order of the
+  blocks leaps, until one group is left.
 
 So the result is that of one fixed sequence, however many threads run it, and no edge is frozen at a
 border. Independent sets by rounds [Luby 1986] cost 4 to 10 times the work and were dropped.
@@ -28,8 +29,8 @@ from ._types import Blocks, Mesh
 __all__ = [
     "DONE",
     "OWNED",
-    "REST",
     "SHIFTED",
+    "face_range",
     "list_range",
     "make_blocks",
     "per_block",
@@ -40,7 +41,6 @@ __all__ = [
 
 OWNED = 0
 SHIFTED = 1
-REST = 2
 
 DONE = -1
 
@@ -83,7 +83,10 @@ def _first_owned(mesh: Mesh, start: int, missing: int) -> int:
 
 def stages(blocks: Blocks) -> tuple[int, ...]:
     """Stages that a mesh of so many blocks needs; a single block owns everything."""
-    return (OWNED, SHIFTED, REST) if len(blocks.face) > 2 else (OWNED,)
+    last = OWNED
+    while _group(last) < len(blocks.face) - 1:
+        last += 1
+    return tuple(range(last + 1))
 
 
 def per_block(mesh: Mesh, blocks: Blocks, *_: Any) -> int:
@@ -92,32 +95,45 @@ def per_block(mesh: Mesh, blocks: Blocks, *_: Any) -> int:
 
 
 def per_stage_block(mesh: Mesh, blocks: Blocks, stage: int, *_: Any) -> int:
-    """Pieces of a loop over the blocks of a stage."""
+    """Pieces of a loop over the blocks of a stage, or its groups of blocks."""
     count = len(blocks.face) - 1
-    if stage == OWNED:
-        return count
-    return count - 1 if stage == SHIFTED else 1
+    return count - 1 if stage == SHIFTED else -(-count // _group(stage))
+
+
+def _group(stage: int) -> int:
+    """Blocks in a group."""
+    return 1 if stage <= SHIFTED else 1 << 2 * (stage - SHIFTED)
 
 
 @inlined
 def vertex_range(blocks, stage, k):
     """Vertices that block ``k`` of a stage may touch."""
-    last = blocks.vertex.size - 1
-    if stage == OWNED:
-        return blocks.vertex[k], blocks.vertex[k + 1]
+    return _range(blocks.vertex, stage, k)
+
+
+@inlined
+def face_range(blocks, stage, k):
+    """Faces that block ``k`` of a stage may remove and make."""
+    return _range(blocks.face, stage, k)
+
+
+@inlined
+def _range(ends, stage, k):
     if stage == SHIFTED:
-        low = (blocks.vertex[k] + blocks.vertex[k + 1]) // 2
-        high = (blocks.vertex[k + 1] + blocks.vertex[k + 2]) // 2
-        return low, high
-    return np.int64(0), blocks.vertex[last]
+        return (ends[k] + ends[k + 1]) // 2, (ends[k + 1] + ends[k + 2]) // 2
+    first, end = _groups(ends.size - 1, stage, k)
+    return ends[first], ends[end]
 
 
 @inlined
 def list_range(blocks, stage, k):
     """Candidate lists (first, end) that block ``k`` of a stage reads."""
-    k = np.int64(k)
-    if stage == OWNED:
-        return k, k + 1
     if stage == SHIFTED:
-        return k, k + 2
-    return np.int64(0), np.int64(blocks.face.size - 1)
+        return np.int64(k), np.int64(k) + 2
+    return _groups(blocks.face.size - 1, stage, k)
+
+
+@inlined
+def _groups(count, stage, k):
+    size = np.int64(1) << (2 * max(0, stage - SHIFTED))
+    return np.int64(k) * size, min((np.int64(k) + 1) * size, np.int64(count))

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jit import compile_notice
+from ._jit import compile_notice, threaded
 from ._threads import thread_scope
-from ._types import FIXED, FROZEN, NONE, Blocks, FloatArray, IndexArray, Mesh
+from ._types import DEAD, FIXED, FROZEN, NONE, Blocks, FloatArray, IndexArray, Mesh
 from .clean import weld_vertices
 from .constraints import Constraints, edge_keys
 from .edge_sets import make_blocks
@@ -49,9 +49,7 @@ class Output:
     lengths: FloatArray
 
 
-def locate(
-    mesh: Mesh, blocks: Blocks, reference: Reference, on_input: bool, parallel: bool
-) -> FloatArray:
+def locate(mesh: Mesh, reference: Reference, on_input: bool, parallel: bool) -> FloatArray:
     """Find where on the reference the vertices of a compact mesh lie; sets ``mesh.birth``.
 
     Returns
@@ -61,52 +59,52 @@ def locate(
         looked for beyond where a walk leads.
     """
     trust = np.inf if on_input else _TRUST * float(mesh.X[:, 3].mean())
-    return locate_vertices(mesh, blocks, reference, trust, parallel)
+    return locate_vertices(mesh, make_blocks(mesh), reference, trust, parallel)
 
 
 def extract(
     mesh: Mesh,
+    is_compact: bool,
     barycentric: FloatArray | None,
     prepared: Prepared,
     built: Built,
     constraints: Constraints,
     V: FloatArray,
-    n_faces: int,
+    shapes: tuple[int, np.dtype[Any]],
     threads: int,
 ) -> Output:
-    """Turn a compact mesh into the caller's arrays.
+    """Turn a mesh into the caller's arrays.
 
     Parameters
     ----------
     mesh : Mesh
+    is_compact : bool
+        Whether no face and no vertex of it has been removed; there are no seams where some were.
     barycentric : (n, 3) float64, optional
         Where on the face of ``mesh.birth`` each vertex lies; None to find out when asked.
     prepared, built, constraints
     V : (n_in, 3) float64
         The caller's vertices: fixed ones are copied from there, bit for bit.
-    n_faces : int
-        Faces of the input.
+    shapes : int, dtype
+        Faces of the input, and their type: that of the output's too, where it reaches.
     threads : int
-        Threads to use at most by what is left until asked for.
+        Threads to use at most, also by what is left until asked for.
     """
-    fixed = np.flatnonzero(mesh.kind == FIXED)
+    n_faces, dtype = shapes
+    numbers = _weld(mesh, built) if is_compact else _number(mesh, threads > 1)
+    F, points, lengths = _write(mesh, numbers, prepared, dtype, threads > 1)
+    fixed = np.flatnonzero((mesh.kind == FIXED) & (mesh.vertex_halfedge != DEAD))
     born_at = prepared.vertex_source[built.reference.origin[mesh.birth[fixed]]]
-    points = mesh.X[:, :3] / prepared.scale
-    points += prepared.centre
+    ends = _curve_ends(mesh, built)
+    if numbers.new.size:
+        fixed, ends = numbers.new[fixed].astype(np.int64), numbers.new[ends]
     points[fixed] = V[born_at]
-    lengths = mesh.X[:, 3] / prepared.scale
-    F: NDArray[Any] = mesh.origin.reshape(-1, 3)
-    ends: NDArray[Any] = _curve_ends(mesh, built)
-    kept = None
-    welded = _weld(mesh, built)
-    if welded is not None:
-        kept, new = welded
-        points, lengths, F, ends, fixed = points[kept], lengths[kept], new[F], new[ends], new[fixed]
     labels, face_map = None, (np.empty(0, np.int64), np.empty(0, np.int64))
     if built.held is not None or constraints.labels is not None:
-        source = prepared.face_source[mesh.source]
+        born_in = mesh.source[numbers.faces] if numbers.faces.size else mesh.source
+        source = prepared.face_source[born_in]
         if built.held is not None:
-            held = built.held[mesh.source]
+            held = built.held[born_in]
             if constraints.unselected is not None:
                 first = constraints.unselected[source] & held
                 order = np.lexsort((np.where(first, source, 0), ~first))
@@ -115,16 +113,16 @@ def extract(
         if constraints.labels is not None:
             labels = constraints.labels[source]
     if barycentric is None:
-        where = partial(
-            _locate_late, _vertices_of(mesh), make_blocks(mesh), built.reference, threads
-        )
+        trust = _TRUST * prepared.scale * float(lengths.mean())
+        vertices, blocks = _vertices_of(mesh), make_blocks(mesh)
+        where = partial(_locate_late, vertices, blocks, built.reference, trust, threads)
     else:
         where = partial(_known, mesh.birth, barycentric)
     return Output(
         points,
         F,
         labels,
-        partial(_births, where, kept, prepared.face_source, prepared.flipped),
+        partial(_births, where, numbers.kept, prepared.face_source, prepared.flipped),
         partial(_spread, len(V), born_at, fixed, prepared.same),
         partial(_spread, n_faces, *face_map),
         partial(_feature_edges, ends),
@@ -133,29 +131,117 @@ def extract(
     )
 
 
-def _weld(mesh: Mesh, built: Built) -> tuple[NDArray[np.intp], IntArray] | None:
-    """Vertices that stay, and the new number of each: sheets share theirs again. None: all stay."""
-    if built.on_seam is None:
-        return None
-    target = weld_vertices(mesh.X[:, :3], seam_vertices(mesh, built))
+# -- new numbers ------------------------------------------------------------------------------
+
+
+class _Numbers(NamedTuple):
+    """Which faces and vertices stay, in their new order; nothing where all do."""
+
+    faces: IndexArray
+    kept: IndexArray
+    new: IndexArray  # new number of every vertex
+
+
+_NOTHING = np.empty(0, np.int32)
+
+_FACES = 32768  # in a piece of a loop
+
+
+def _number(mesh: Mesh, parallel: bool) -> _Numbers:
+    """Leave removed faces and vertices out; vertices follow the half-edges that own them."""
+    faces = np.empty(mesh.origin.size // 3, np.int32)
+    kept, new = np.empty(len(mesh.X), np.int32), np.empty(len(mesh.X), np.int32)
+    sizes = np.zeros((_per_piece(mesh), 2), np.int64)
+    starts = np.zeros_like(sizes)
+    if len(sizes) > 1:
+        _list_alive(parallel, mesh, False, starts, sizes, faces, kept, new)
+        np.cumsum(sizes[:-1], axis=0, out=starts[1:])
+    _list_alive(parallel, mesh, True, starts, sizes, faces, kept, new)
+    m, n = sizes.sum(axis=0).tolist()
+    return _Numbers(faces[:m], kept[:n], new)
+
+
+def _per_piece(mesh: Mesh, *_: Any) -> int:
+    return -(-mesh.origin.size // (3 * _FACES))
+
+
+@threaded(_per_piece)
+def _list_alive(span, mesh, is_filling, starts, sizes, faces, kept, new):
+    """List faces and vertices by pieces of all faces, or only count them."""
+    for k in range(span[0], span[1]):
+        n_faces = starts[k, 0]
+        n_vertices = starts[k, 1]
+        for f in range(_FACES * k, min(_FACES * k + _FACES, mesh.origin.size // 3)):
+            if mesh.origin[3 * f] == DEAD:
+                continue
+            if is_filling:
+                faces[n_faces] = f
+            n_faces += 1
+            for h in range(3 * f, 3 * f + 3):
+                v = mesh.origin[h]
+                if mesh.vertex_halfedge[v] == h:
+                    if is_filling:
+                        kept[n_vertices] = v
+                        new[v] = n_vertices
+                    n_vertices += 1
+        sizes[k, 0] = n_faces - starts[k, 0]
+        sizes[k, 1] = n_vertices - starts[k, 1]
+
+
+def _weld(mesh: Mesh, built: Built) -> _Numbers:
+    """Let the sheets of a compact mesh share their vertices again."""
+    target = None
+    if built.on_seam is not None:
+        target = weld_vertices(mesh.X[:, :3], seam_vertices(mesh, built))
     if target is None:
-        return None
-    kept = np.flatnonzero(target == np.arange(len(target)))
-    new = np.full(len(target), -1, np.int64)
-    new[kept] = np.arange(len(kept))
-    return kept, new[target]
+        return _Numbers(_NOTHING, _NOTHING, _NOTHING)
+    kept = np.flatnonzero(target == np.arange(len(target))).astype(np.int32)
+    new = np.empty(len(target), np.int32)
+    new[kept] = np.arange(len(kept), dtype=np.int32)
+    return _Numbers(_NOTHING, kept, new[target])
+
+
+def _write(
+    mesh: Mesh, numbers: _Numbers, prepared: Prepared, dtype: np.dtype[Any], parallel: bool
+) -> tuple[NDArray[Any], FloatArray, FloatArray]:
+    """Write faces, vertices and lengths in the units of the caller."""
+    m = numbers.faces.size or mesh.origin.size // 3
+    n = numbers.kept.size or len(mesh.X)
+    if dtype.kind not in "iu" or n - 1 > np.iinfo(dtype).max:
+        dtype = np.dtype(np.int64)
+    F = np.empty((m, 3), dtype if dtype in (np.int32, np.int64) else np.int64)
+    points, lengths = np.empty((n, 3)), np.empty(n)
+    _fill(parallel, mesh, numbers, prepared.scale, prepared.centre, F, points, lengths)
+    return F.astype(dtype, copy=False), points, lengths
+
+
+@threaded(_per_piece)
+def _fill(span, mesh, numbers, scale, centre, F, points, lengths):
+    pieces = -(-mesh.origin.size // (3 * _FACES))
+    for i in range(span[0] * F.shape[0] // pieces, span[1] * F.shape[0] // pieces):
+        f = numbers.faces[i] if numbers.faces.size else i
+        for c in range(3):
+            v = mesh.origin[3 * f + c]
+            F[i, c] = numbers.new[v] if numbers.new.size else v
+    for i in range(span[0] * lengths.size // pieces, span[1] * lengths.size // pieces):
+        v = numbers.kept[i] if numbers.kept.size else i
+        for c in range(3):
+            points[i, c] = mesh.X[v, c] / scale + centre[c]
+        lengths[i] = mesh.X[v, 3] / scale
 
 
 def _curve_ends(mesh: Mesh, built: Built) -> NDArray[Any]:
     """Return the ends (2, k) of edges on curves; of the frozen ones those that were features."""
+    if not built.has_curves and built.held is None:
+        return np.empty((2, 0), np.int32)
     h = np.flatnonzero(mesh.curve != NONE)
-    h = h[mesh.twin[h] < h]
+    h = h[(mesh.twin[h] < h) & (mesh.origin[h] != DEAD)]
     ends = ends_of(mesh.origin, h)
     is_frozen = mesh.curve[h] == FROZEN
     if is_frozen.any():
-        origin = built.reference.origin
-        known = edge_keys(ends_of(origin, built.features), len(built.reference.X))
-        is_feature = np.isin(edge_keys(origin[mesh.birth[ends]], len(built.reference.X)), known)
+        origin, n = built.reference.origin, len(built.reference.X)
+        known = edge_keys(ends_of(origin, built.features), n)
+        is_feature = np.isin(edge_keys(origin[mesh.birth[ends]], n), known)
         is_feature &= (mesh.kind[ends] == FIXED).all(axis=0)
         ends = ends[:, ~is_frozen | is_feature]
     return ends
@@ -166,13 +252,13 @@ def _curve_ends(mesh: Mesh, built: Built) -> NDArray[Any]:
 
 def _births(
     where: Callable[[], tuple[IndexArray, FloatArray]],
-    kept: NDArray[np.intp] | None,
+    kept: IndexArray,
     face_source: NDArray[Any],
     flipped: NDArray[np.bool_] | None,
 ) -> tuple[IntArray, FloatArray]:
     """Faces of the input, and weights of their corners, from those of the reference."""
     birth, barycentric = where()
-    if kept is not None:
+    if kept.size:
         birth, barycentric = birth[kept], barycentric[kept]
     face = face_source[birth // 3].astype(np.int64)
     if flipped is not None:
@@ -186,12 +272,12 @@ def _known(birth: IndexArray, barycentric: FloatArray) -> tuple[IndexArray, Floa
 
 
 def _locate_late(
-    vertices: Mesh, blocks: Blocks, reference: Reference, threads: int
+    vertices: Mesh, blocks: Blocks, reference: Reference, trust: float, threads: int
 ) -> tuple[IndexArray, FloatArray]:
     """Look for vertices that were not projected, after the call that made them."""
     with compile_notice(), thread_scope(threads) as may_run:
         reference.surface.parallel = may_run
-        barycentric = locate(vertices, blocks, reference, False, may_run)
+        barycentric = locate_vertices(vertices, blocks, reference, trust, may_run)
     return vertices.birth, barycentric
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._jit import kernel
+from ._jit import threaded
 from ._types import DEAD, FROZEN, FloatArray, IndexArray, Mesh
 from .constraints import Marks
 from .creases import find_creases
@@ -45,6 +45,9 @@ _ADAPTIVE_SHARE = 0.9
 _DEVIATION_SHARE = 0.5
 
 
+# Faces in a piece of a loop.
+_FACES = 32768
+
 # Rounds over all edges that bound the growth of lengths; each reaches one edge further.
 _GRADATION_ROUNDS = 32
 
@@ -57,21 +60,26 @@ class Measures(NamedTuple):
     coordinate: float  # how far from the origin of the input it lies
 
 
-def measure(prepared: Prepared) -> Measures:
+def measure(prepared: Prepared, parallel: bool = False) -> Measures:
     """Measure a prepared mesh; notes its faces without area.
+
+    Sums are taken by pieces of many faces, which threads share.
 
     Raises
     ------
     MeshInputError
         No face has an area.
     """
-    area, mean_edge, flat = _measure(prepared.mesh)
+    mesh = prepared.mesh
+    sums = np.empty((_per_piece(mesh), 4))
+    _measure(parallel, mesh, sums)
+    area, edges, n_edges, flat = (sum(column) for column in sums.T.tolist())
     if flat:
-        prepared.dirt["zero_area_faces"] = flat
+        prepared.dirt["zero_area_faces"] = int(flat)
     if not area > 0.0:
         raise MeshInputError("all faces of F have no area: there is no surface to remesh")
     far = float(np.abs(prepared.centre).max()) * prepared.scale + 1.0
-    return Measures(area, mean_edge, far)
+    return Measures(area, edges / n_edges, far)
 
 
 def bound_gradation(
@@ -281,32 +289,41 @@ def _check_output(
         )
 
 
-@kernel
-def _measure(mesh):
-    """Total area, mean edge length, number of faces without area.
+def _per_piece(mesh: Mesh, *_: Any) -> int:
+    return -(-mesh.origin.size // (3 * _FACES))
+
+
+@threaded(_per_piece)
+def _measure(span, mesh, sums):
+    """Area, length of all edges, their number, number of faces without area, by pieces.
 
     All sides are measured and half of them dropped: which one no processor can predict.
     """
     X = mesh.X
-    area = 0.0
-    edges = 0.0
-    count = 0
-    flat = 0
-    for f in range(mesh.origin.size // 3):
-        a = mesh.origin[3 * f]
-        b = mesh.origin[3 * f + 1]
-        c = mesh.origin[3 * f + 2]
-        nx, ny, nz = face_vector(
-            X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-        )
-        face_area = 0.5 * sqrt(nx * nx + ny * ny + nz * nz)
-        area += face_area
-        flat += face_area == 0.0
-        ab = np.int64(mesh.twin[3 * f] < 3 * f)
-        bc = np.int64(mesh.twin[3 * f + 1] < 3 * f + 1)
-        ca = np.int64(mesh.twin[3 * f + 2] < 3 * f + 2)
-        edges += sqrt(distance_squared(X, a, b)) * ab
-        edges += sqrt(distance_squared(X, b, c)) * bc
-        edges += sqrt(distance_squared(X, c, a)) * ca
-        count += ab + bc + ca
-    return area, edges / count, flat
+    n_faces = mesh.origin.size // 3
+    for k in range(span[0], span[1]):
+        area = 0.0
+        edges = 0.0
+        count = 0
+        flat = 0
+        for f in range(_FACES * k, min(_FACES * k + _FACES, n_faces)):
+            a = mesh.origin[3 * f]
+            b = mesh.origin[3 * f + 1]
+            c = mesh.origin[3 * f + 2]
+            nx, ny, nz = face_vector(
+                X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
+            )
+            face_area = 0.5 * sqrt(nx * nx + ny * ny + nz * nz)
+            area += face_area
+            flat += face_area == 0.0
+            ab = np.int64(mesh.twin[3 * f] < 3 * f)
+            bc = np.int64(mesh.twin[3 * f + 1] < 3 * f + 1)
+            ca = np.int64(mesh.twin[3 * f + 2] < 3 * f + 2)
+            edges += sqrt(distance_squared(X, a, b)) * ab
+            edges += sqrt(distance_squared(X, b, c)) * bc
+            edges += sqrt(distance_squared(X, c, a)) * ca
+            count += ab + bc + ca
+        sums[k, 0] = area
+        sums[k, 1] = edges
+        sums[k, 2] = count
+        sums[k, 3] = flat

@@ -13,13 +13,11 @@ from numpy.typing import ArrayLike
 from ._check import as_mesh, positive_count
 from ._jit import compile_notice
 from ._threads import thread_scope
-from ._types import FloatArray, Mesh
+from ._types import DEAD, FloatArray, Mesh
 from .constraints import Constraints, make_constraints
-from .edge_sets import make_blocks
 from .errors import OptionError
 from .extract import extract, locate
 from .lengths import (
-    Measures,
     adaptive_limits,
     check_gradation,
     limited_lengths,
@@ -206,44 +204,35 @@ def remesh(
         sweeps = Sweeps(options, watch, may_run, callback)
         with watch.time("build"):
             prepared = prepare(vertices, faces, sweeps.is_parallel(len(faces)))
-        sweeps.scale = prepared.scale
-        sweeps.gradation = sizing.gradation
-        if isinstance(L, Adaptive):
-            sweeps.tolerance = L.tolerance * prepared.scale
-            sweeps.shortest = adaptive_limits(prepared, L)[0]
-            sweeps.limit_lengths = lambda x: limited_lengths(prepared, x, sizing.gradation)
-        job = _Job(prepared, measure(prepared), constraints, vertices, sizing, sweeps)
-        done = job.run() if count is None else _meet_count(job, *count)
+        job = _Job(prepared, constraints, vertices, sizing, sweeps)
+        del prepared  # it holds the mesh of the input
+        done = job.run_once() if count is None else _meet_count(job, *count)
         parallel = sweeps.is_parallel(len(done.mesh.origin) // 3)
         barycentric = None
         if options.project or options.fit_rounds:
             with watch.time("locate"):
                 barycentric = locate(
-                    done.mesh,
-                    make_blocks(done.mesh),
-                    done.built.reference,
-                    not options.fit_rounds,
-                    parallel,
+                    done.mesh, done.built.reference, not options.fit_rounds, parallel
                 )
-    with watch.time("extract"):
-        out = extract(
-            done.mesh,
-            barycentric,
-            prepared,
-            done.built,
-            constraints,
-            vertices,
-            len(faces),
-            options.threads if parallel else 1,
-        )
-        V2 = out.V.astype(_vertex_dtype(V), copy=False)
-        F2 = out.F.astype(_face_dtype(F, len(V2)))
+        with watch.time("extract"):
+            out = extract(
+                done.mesh,
+                done.is_compact,
+                barycentric,
+                job.prepared,
+                done.built,
+                constraints,
+                vertices,
+                (len(faces), np.asarray(F).dtype),
+                options.threads if parallel else 1,
+            )
+            V2 = out.V.astype(_vertex_dtype(V), copy=False)
     report = Report(
-        done.length, options, sweeps.counts, watch.stop(), sweeps.stop, prepared.dirt,
-        done.built.counts, sweeps.deviation, before=(V, F), after=(V2, F2),
+        done.length, options, sweeps.counts, watch.stop(), sweeps.stop, job.prepared.dirt,
+        done.built.counts, sweeps.deviation, before=(V, F), after=(V2, out.F),
     )  # fmt: skip
     return RemeshResult(
-        V2, F2, report, out.face_labels, out.lengths, Late(out.births), Late(out.vertex_map),
+        V2, out.F, report, out.face_labels, out.lengths, Late(out.births), Late(out.vertex_map),
         Late(out.face_map), Late(out.feature_edges), Late(out.corners),
     )  # fmt: skip
 
@@ -262,56 +251,86 @@ class _Done:
     """A remeshed surface in the frame of `Prepared`."""
 
     mesh: Mesh
+    is_compact: bool
     built: Built
     length: float  # of the mean new edge, in the units of the input
 
     def count(self, noun: str) -> int:
         """Count faces or vertices."""
-        return len(self.mesh.origin) // 3 if noun == "faces" else len(self.mesh.X)
+        alive = self.mesh.origin[::3] if noun == "faces" else self.mesh.vertex_halfedge
+        return int(np.count_nonzero(alive != DEAD))
 
     def count_held(self) -> int:
         """Count faces that had to stay."""
         return 0 if self.built.held is None else int(self.built.held.sum())
 
 
-@dataclass(frozen=True)
 class _Job:
     """One prepared mesh, to be remeshed with one length or several."""
 
-    prepared: Prepared
-    measures: Measures
-    constraints: Constraints
-    V: FloatArray
-    sizing: Sizing
-    sweeps: Sweeps
+    def __init__(
+        self,
+        prepared: Prepared,
+        constraints: Constraints,
+        V: FloatArray,
+        sizing: Sizing,
+        sweeps: Sweeps,
+    ) -> None:
+        self.prepared = prepared
+        self.constraints = constraints
+        self.V = V
+        self.sizing = sizing
+        self.sweeps = sweeps
+        self.parallel = sweeps.is_parallel(len(prepared.mesh.origin) // 3)
+        with sweeps.watch.time("reference"):
+            self.measures = measure(prepared, self.parallel)
+        sweeps.scale = prepared.scale
+        sweeps.gradation = sizing.gradation
+        if isinstance(sizing.L, Adaptive):
+            sweeps.tolerance = sizing.L.tolerance * prepared.scale
+            sweeps.shortest = adaptive_limits(prepared, sizing.L)[0]
+            sweeps.limit_lengths = lambda x: limited_lengths(prepared, x, sizing.gradation)
 
-    def run(self, L: float | None = None) -> _Done:
+    def run_once(self) -> _Done:
+        """Remesh, and let go of the prepared mesh; lengths from the curvature need it again."""
+        if isinstance(self.sizing.L, Adaptive):
+            return self.run(None)
+        meshes = [self.prepared.mesh]
+        nothing = Mesh(*(array[:0].copy() for array in meshes[0]))  # type: ignore[arg-type]
+        self.prepared = self.prepared._replace(mesh=nothing)
+        return self._sweep(meshes, self.sizing.L)
+
+    def run(self, L: Lengths | None) -> _Done:
         """Remesh a copy of the mesh."""
-        prepared = self.prepared._replace(mesh=self.prepared.mesh.copy())
-        mesh, watch = prepared.mesh, self.sweeps.watch
-        sizing = self.sizing
-        with watch.time("reference"):
-            marks = self.constraints.on_mesh(
-                mesh, prepared.vertex_source, prepared.face_source, prepared.same
-            )
-            angle = self.constraints.feature_angle
-            length = set_lengths(
-                prepared,
-                self.measures,
-                self.V,
-                sizing.L if L is None else L,
-                marks,
-                angle,
-                sizing.gradation,
-                sizing.max_faces,
-                self.sweeps.options.max_deviation,
-            )
-            parallel = self.sweeps.is_parallel(len(mesh.origin) // 3)
-            mean_edge = self.measures.mean_edge
-            built = build_reference(mesh, prepared.vertex_source, angle, marks, mean_edge, parallel)
-        mesh = self.sweeps.run(mesh, built)
-        mesh = self.sweeps.finish(mesh, built)
-        return _Done(mesh, built, length / prepared.scale)
+        return self._sweep([self.prepared.mesh.copy()], self.sizing.L if L is None else L)
+
+    def _sweep(self, meshes: list[Mesh], L: Lengths | None) -> _Done:
+        """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
+        with self.sweeps.watch.time("reference"):
+            built, length = self._look_back(meshes[0], L)
+        mesh = self.sweeps.run(meshes.pop(), built)
+        is_compact = self.sweeps.has_more(built)
+        mesh = self.sweeps.finish(mesh, built) if is_compact else mesh
+        return _Done(mesh, is_compact, built, length / self.prepared.scale)
+
+    def _look_back(self, mesh: Mesh, L: Lengths | None) -> tuple[Built, float]:
+        """Set the lengths of a mesh, mark its features, build the reference."""
+        prepared, constraints = self.prepared._replace(mesh=mesh), self.constraints
+        source, angle = prepared.vertex_source, constraints.feature_angle
+        marks = constraints.on_mesh(mesh, source, prepared.face_source, prepared.same)
+        length = set_lengths(
+            prepared,
+            self.measures,
+            self.V,
+            L,
+            marks,
+            angle,
+            self.sizing.gradation,
+            self.sizing.max_faces,
+            self.sweeps.options.max_deviation,
+        )
+        mean_edge = self.measures.mean_edge
+        return build_reference(mesh, source, angle, marks, mean_edge, self.parallel), length
 
 
 def _wanted_count(L: Any, n_faces: Any, n_vertices: Any) -> tuple[str, int] | None:
@@ -354,9 +373,3 @@ def _vertex_dtype(V: ArrayLike) -> np.dtype[Any]:
     """Return the caller's dtype; coordinates that were whole numbers come back as float64."""
     dtype = np.asarray(V).dtype
     return dtype if dtype.kind == "f" else np.dtype(np.float64)
-
-
-def _face_dtype(F: ArrayLike, n: int) -> np.dtype[Any]:
-    """Return the caller's dtype, or int64 where that does not reach."""
-    dtype = np.asarray(F).dtype
-    return dtype if dtype.kind in "iu" and n - 1 <= np.iinfo(dtype).max else np.dtype(np.int64)

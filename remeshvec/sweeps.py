@@ -110,6 +110,7 @@ class Sweeps:
         self.guard: DeviationGuard | None = None
         self.deviation: dict[str, float] = {}
         self.is_calm = False
+        self.varies = False  # target lengths do
         self.counts: list[dict[str, int]] = []
         self.stop = "all sweeps done"
 
@@ -120,7 +121,7 @@ class Sweeps:
     def run(self, mesh: Mesh, built: Built) -> Mesh:
         """Run all sweeps, or until little changes, or until the callback ends them."""
         blocks = make_blocks(mesh)
-        varies = bool(np.ptp(mesh.X[:, 3]) > 0.0)
+        self.varies = varies = bool(np.ptp(mesh.X[:, 3]) > 0.0)
         self.counts = []
         self.is_calm = False
         self.guard = self._make_guard(mesh, built)
@@ -302,6 +303,13 @@ class Sweeps:
             if varies:
                 read_lengths(mesh, blocks, built.reference, parallel)
                 bound_gradation(mesh, self.gradation, copies_on_seams(mesh, built))
+
+    def has_more(self, built: Built) -> bool:
+        """Tell whether something is left for `finish`."""
+        options = self.options
+        is_guarded = self.guard is not None or self.tolerance is not None
+        moves = options.project or options.untangle_rounds or options.fit_rounds
+        return bool(moves or is_guarded or self.varies or built.on_seam is not None)
 
     def finish(self, mesh: Mesh, built: Built) -> Mesh:
         """Project for the last time, untangle, fit; returns a compact mesh."""

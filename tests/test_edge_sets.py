@@ -11,7 +11,7 @@ from structure import assert_same_bits, blocks_of, built, copied, half_edge, tre
 
 from remeshvec import edge_sets
 from remeshvec._types import DEAD, Blocks
-from remeshvec.edge_sets import OWNED, REST, SHIFTED, list_range, per_stage_block, vertex_range
+from remeshvec.edge_sets import OWNED, SHIFTED, list_range, per_stage_block, vertex_range
 from remeshvec.operations import bisect, collapse, flip, untangle
 from remeshvec.operations.measure import measure_edges
 
@@ -40,22 +40,33 @@ def test_small_meshes_are_one_block_and_big_ones_many():
     assert len(edge_sets.stages(edge_sets.make_blocks(mesh))) == 3
 
 
+@pytest.mark.parametrize(("count", "expected"), [(1, 1), (2, 3), (4, 3), (5, 4), (16, 4), (17, 5)])
+def test_stages_end_with_one_group(count, expected):
+    ends = np.arange(count + 1)
+    stages = edge_sets.stages(Blocks(ends, ends))
+    assert stages == tuple(range(expected))
+    assert per_stage_block(None, Blocks(ends, ends), stages[-1]) == 1
+    assert vertex_range(Blocks(ends, ends), stages[-1], 0) == (0, count)
+
+
 def test_one_block_needs_one_stage():
     assert edge_sets.stages(edge_sets.make_blocks(built(*zoo.torus()))) == (OWNED,)
 
 
-@pytest.mark.parametrize("stage", [OWNED, SHIFTED, REST])
+@pytest.mark.parametrize("stage", [OWNED, SHIFTED, 2, 3])
 def test_ranges_of_a_stage_are_disjoint(stage):
     blocks = Blocks(np.arange(0, 60, 10), np.array([0, 3, 9, 9, 20, 31]))
     pieces = range(per_stage_block(None, blocks, stage))
     ranges = [vertex_range(blocks, stage, k) for k in pieces]
     assert all(low <= high for low, high in ranges)
     assert all(one[1] <= two[0] for one, two in pairwise(ranges))
-    if stage == OWNED:
+    if stage != SHIFTED:
         assert ranges[0][0] == 0 and ranges[-1][1] == 31
     lists = [range(*list_range(blocks, stage, k)) for k in pieces]
-    if stage == REST:
+    if stage == 3:
         assert ranges == [(0, 31)] and list(lists[0]) == [0, 1, 2, 3, 4]
+    if stage == 2:
+        assert ranges == [(0, 20), (20, 31)] and [list(one) for one in lists] == [[0, 1, 2, 3], [4]]
     if stage == OWNED:
         assert [list(one) for one in lists] == [[0], [1], [2], [3], [4]]
 

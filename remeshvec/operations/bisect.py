@@ -11,7 +11,7 @@ import numpy as np
 
 from .._jit import inlined, threaded
 from .._types import CURVE, DEAD, FIXED, HELD, INNER, NONE, SEAM, Blocks, Mesh
-from ..edge_sets import OWNED, SHIFTED, list_range, per_stage_block, stages, vertex_range
+from ..edge_sets import face_range, list_range, per_stage_block, stages, vertex_range
 from ..halfedge import following, previous
 from .measure import REMOVED, EdgeFlags, edge_flags
 
@@ -45,7 +45,7 @@ def _bisect(span, mesh, blocks, stage, half_longest, twice_shortest, mask, done,
     for k in range(span[0], span[1]):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
-        room, room_end = _face_range(blocks, stage, k)
+        room, room_end = face_range(blocks, stage, k)
         v = low
         for f in range(blocks.face[first], blocks.face[end]):
             if mask[f] & 7 == 0 or mask[f] == REMOVED:
@@ -66,19 +66,6 @@ def _bisect(span, mesh, blocks, stage, half_longest, twice_shortest, mask, done,
                     continue
                 done[k] += 1
                 left[k] += _split_edge(mesh, h, v, room, other, half_longest, twice_shortest, mask)
-
-
-@inlined
-def _face_range(blocks, stage, k):
-    """Faces whose room block ``k`` of a stage may use."""
-    last = blocks.face.size - 1
-    if stage == OWNED:
-        return blocks.face[k], blocks.face[k + 1]
-    if stage == SHIFTED:
-        low = (blocks.face[k] + blocks.face[k + 1]) // 2
-        high = (blocks.face[k + 1] + blocks.face[k + 2]) // 2
-        return low, high
-    return np.int64(0), blocks.face[last]
 
 
 @inlined

@@ -16,7 +16,7 @@ import numpy as np
 
 from .._jit import add_four, add_row, inlined, threaded
 from .._types import CURVE, DEAD, INNER, NONE, Blocks, Mesh
-from ..edge_sets import SHIFTED, list_range, per_block, per_stage_block, stages, vertex_range
+from ..edge_sets import list_range, per_block, per_stage_block, stages, vertex_range
 from ..geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
 
 __all__ = ["relax_vertices"]
@@ -72,7 +72,7 @@ def _sum_areas(span, mesh, blocks, weighted, across, count):
 
 @threaded(per_stage_block)
 def _sum_areas_across(span, mesh, blocks, stage, weighted, across, count):
-    """Add the faces across borders; those that a shifted block took are marked by a negative sign."""
+    """Add the faces across borders; those that are done are marked by a negative sign."""
     for k in range(span[0], span[1]):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
@@ -84,7 +84,7 @@ def _sum_areas_across(span, mesh, blocks, stage, weighted, across, count):
                         mesh.X, mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2],
                         weighted,
                     )  # fmt: skip
-                    across[i] = ~f if stage == SHIFTED else f
+                    across[i] = ~f
 
 
 @inlined
@@ -143,20 +143,19 @@ def _sum_rings(span, mesh, blocks, stiffness, weighted, sums):
 
 @threaded(per_stage_block)
 def _sum_rings_across(span, mesh, blocks, stage, stiffness, weighted, across, count, sums):
-    """Add the faces across borders, in the stage in which `_sum_areas_across` did."""
+    """Add the faces across borders, in the order of `_sum_areas_across`, and take their marks off."""
     for k in range(span[0], span[1]):
         low, high = vertex_range(blocks, stage, k)
         first, end = list_range(blocks, stage, k)
         for j in range(first, end):
             for i in range(blocks.face[j], blocks.face[j] + count[j]):
-                f = np.int64(across[i])
-                if stage == SHIFTED:
-                    f = ~f
+                f = ~np.int64(across[i])
                 if f >= 0 and _has_corners_in(mesh, f, low, high):
                     _add_face(
                         mesh.X, weighted, mesh.origin[3 * f], mesh.origin[3 * f + 1],
                         mesh.origin[3 * f + 2], stiffness, sums,
                     )  # fmt: skip
+                    across[i] = f
 
 
 @inlined
