@@ -16,7 +16,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -28,7 +28,7 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.typed_passes import NopythonTypeInference
 from numba.extending import intrinsic
 
-from ._threads import share
+from ._threads import share, uninterrupted
 
 __all__ = [
     "add_four",
@@ -84,12 +84,22 @@ class _Compiler(CompilerBase):
         return [passes]
 
 
-_FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "pipeline_class": _Compiler}
+_FLAGS: dict[str, Any] = {
+    "nogil": True,
+    "error_model": "numpy",
+    "no_cfunc_wrapper": True,
+    "pipeline_class": _Compiler,
+}
 
 # Without `_nrt` a helper counts no references. Passing records of arrays to helpers that do costs
 # about a quarter of the time of a call, in atomic instructions that two threads fight for; in return such
 # a helper cannot allocate. Not cached: helpers live in the caches of the kernels that use them.
-_INLINED: dict[str, Any] = {**_FLAGS, "forceinline": True, "_nrt": False}
+_INLINED: dict[str, Any] = {
+    **_FLAGS,
+    "forceinline": True,
+    "_nrt": False,
+    "no_cpython_wrapper": True,  # Python cannot call them
+}
 
 
 def inlined(function: Callable[..., Any]) -> Any:
@@ -160,7 +170,10 @@ class kernel:  # lower case: a decorator, used like a function
     @cached_property
     def compiled(self) -> Any:
         """The function, compiled by Numba for the types of its arguments."""
-        return numba.njit(cache=True, **_FLAGS)(_keyed(self.py_func))
+        compiled = numba.njit(cache=True, **_FLAGS)(_keyed(self.py_func))
+        if hasattr(compiled, "_compile_for_args"):  # not where the compiler is switched off
+            compiled._compile_for_args = partial(uninterrupted, compiled._compile_for_args)
+        return compiled
 
     def __call__(self, *args: Any) -> Any:
         """Run."""

@@ -18,9 +18,9 @@ from typing import Any
 
 import numba
 
-__all__ = ["available_threads", "share", "thread_scope"]
+__all__ = ["available_threads", "share", "thread_scope", "uninterrupted"]
 
-_PIECES = 4  # for each thread: where one is held up, the others take its pieces
+_PIECES = 16  # for each thread: where one is held up, the others take its pieces
 
 
 class _Helpers:
@@ -55,7 +55,7 @@ class _Job:
     def __init__(self, run: Callable[..., None], count: int, pieces: int, args: Any) -> None:
         self.run, self.count, self.pieces, self.args = run, count, pieces, args
         self.next = itertools.count().__next__  # atomic
-        self.finished: SimpleQueue[BaseException | None] = SimpleQueue()
+        self.finished: SimpleQueue[int | BaseException] = SimpleQueue()  # pieces, by each helper
 
     def take(self) -> int:
         """Run pieces until none is left; returns how many."""
@@ -67,13 +67,13 @@ class _Job:
 
     def help(self) -> None:
         """Run pieces on another thread."""
-        while (i := self.next()) < self.pieces:
-            error = None
-            try:
-                self._run(i)
-            except BaseException as raised:
-                error = raised
+        try:
+            taken = self.take()
+        except BaseException as error:
             self.finished.put(error)
+        else:
+            if taken:
+                self.finished.put(taken)
 
     def _run(self, i: int) -> None:
         span = i * self.count // self.pieces, (i + 1) * self.count // self.pieces
@@ -91,14 +91,37 @@ def share(run: Callable[..., None], count: int, args: Any) -> None:
     helpers = min(threads, job.pieces) - 1
     _helpers.ask(job.help, helpers, min(helpers * calls, available_threads() - 1))
     try:
-        taken = job.take()
-        for _ in range(job.pieces - taken):
-            error = job.finished.get()
-            if error is not None:
-                raise error
+        left = job.pieces - job.take()
+        while left:
+            done = job.finished.get()
+            if isinstance(done, BaseException):
+                raise done
+            left -= done
     except BaseException:
         job.pieces = 0  # nobody begins another one
         raise
+
+
+def uninterrupted(run: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
+    """Call a function where no `KeyboardInterrupt` reaches it; one here leaves it to end by itself.
+
+    Numba is not made to be interrupted: it keeps its lock, and other threads wait for ever.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return run(*args, **kwargs)
+    done: SimpleQueue[tuple[Any, BaseException | None]] = SimpleQueue()
+
+    def work() -> None:
+        try:
+            done.put((run(*args, **kwargs), None))
+        except BaseException as error:
+            done.put((None, error))
+
+    threading.Thread(target=work, name="remeshvec compiles").start()
+    value, error = done.get()
+    if error is not None:
+        raise error
+    return value
 
 
 class _Scope(threading.local):
