@@ -21,6 +21,7 @@ from .constraints import Constraints, edge_keys
 from .edge_sets import make_blocks
 from .halfedge import ends_of
 from .operations.project import Reference, locate_vertices
+from .order import even_ranges, per_range
 from .prepare import Prepared
 from .reference import Built
 from .seams import seam_vertices
@@ -144,34 +145,29 @@ class _Numbers(NamedTuple):
 
 _NOTHING = np.empty(0, np.int32)
 
-_FACES = 32768  # in a piece of a loop
-
 
 def _number(mesh: Mesh, parallel: bool) -> _Numbers:
     """Leave removed faces and vertices out; vertices follow the half-edges that own them."""
     faces = np.empty(mesh.origin.size // 3, np.int32)
     kept, new = np.empty(len(mesh.X), np.int32), np.empty(len(mesh.X), np.int32)
-    sizes = np.zeros((_per_piece(mesh), 2), np.int64)
+    cuts = even_ranges(len(faces), parallel)
+    sizes = np.zeros((len(cuts) - 1, 2), np.int64)
     starts = np.zeros_like(sizes)
     if len(sizes) > 1:
-        _list_alive(parallel, mesh, False, starts, sizes, faces, kept, new)
+        _list_alive(parallel, cuts, mesh, False, starts, sizes, faces, kept, new)
         np.cumsum(sizes[:-1], axis=0, out=starts[1:])
-    _list_alive(parallel, mesh, True, starts, sizes, faces, kept, new)
+    _list_alive(parallel, cuts, mesh, True, starts, sizes, faces, kept, new)
     m, n = sizes.sum(axis=0).tolist()
     return _Numbers(faces[:m], kept[:n], new)
 
 
-def _per_piece(mesh: Mesh, *_: Any) -> int:
-    return -(-mesh.origin.size // (3 * _FACES))
-
-
-@threaded(_per_piece)
-def _list_alive(span, mesh, is_filling, starts, sizes, faces, kept, new):
-    """List faces and vertices by pieces of all faces, or only count them."""
+@threaded(per_range)
+def _list_alive(span, cuts, mesh, is_filling, starts, sizes, faces, kept, new):
+    """List faces and vertices by ranges of all faces, or only count them."""
     for k in range(span[0], span[1]):
         n_faces = starts[k, 0]
         n_vertices = starts[k, 1]
-        for f in range(_FACES * k, min(_FACES * k + _FACES, mesh.origin.size // 3)):
+        for f in range(cuts[k], cuts[k + 1]):
             if mesh.origin[3 * f] == DEAD:
                 continue
             if is_filling:
@@ -211,19 +207,31 @@ def _write(
         dtype = np.dtype(np.int64)
     F = np.empty((m, 3), dtype if dtype in (np.int32, np.int64) else np.int64)
     points, lengths = np.empty((n, 3)), np.empty(n)
-    _fill(parallel, mesh, numbers, prepared.scale, prepared.centre, F, points, lengths)
+    cuts = even_ranges(m, parallel)
+    vertex_cuts = even_ranges(n, parallel)
+    _fill(
+        parallel,
+        cuts,
+        vertex_cuts,
+        mesh,
+        numbers,
+        prepared.scale,
+        prepared.centre,
+        F,
+        points,
+        lengths,
+    )
     return F.astype(dtype, copy=False), points, lengths
 
 
-@threaded(_per_piece)
-def _fill(span, mesh, numbers, scale, centre, F, points, lengths):
-    pieces = -(-mesh.origin.size // (3 * _FACES))
-    for i in range(span[0] * F.shape[0] // pieces, span[1] * F.shape[0] // pieces):
+@threaded(per_range)
+def _fill(span, cuts, vertex_cuts, mesh, numbers, scale, centre, F, points, lengths):
+    for i in range(cuts[span[0]], cuts[span[1]]):
         f = numbers.faces[i] if numbers.faces.size else i
         for c in range(3):
             v = mesh.origin[3 * f + c]
             F[i, c] = numbers.new[v] if numbers.new.size else v
-    for i in range(span[0] * lengths.size // pieces, span[1] * lengths.size // pieces):
+    for i in range(vertex_cuts[span[0]], vertex_cuts[span[1]]):
         v = numbers.kept[i] if numbers.kept.size else i
         for c in range(3):
             points[i, c] = mesh.X[v, c] / scale + centre[c]

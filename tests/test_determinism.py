@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import nonmanifold
 import numpy as np
@@ -24,7 +25,7 @@ from structure import (
 )
 
 import remeshvec
-from remeshvec import _jit
+from remeshvec import _jit, extract
 from remeshvec._types import FIXED, NONE
 from remeshvec.bvh import Surface, closest_faces
 from remeshvec.operations.bisect import bisect_edges
@@ -80,6 +81,18 @@ def phases():
     yield "locate", lambda m, b, r, p: locate(m, r, b, p)
     yield "lengths", lambda m, b, r, p: read_lengths(stretched(m), b, r, p)
     yield "closest", lambda m, b, r, p: closest_faces(r.tree, *queries(m), 0.0, p)
+
+
+def write_out(mesh, parallel):
+    """Arrays of a mesh with removed faces and vertices, twice as large."""
+    numbers = extract._number(mesh, parallel)
+    assert len(numbers.faces) < len(mesh.source)
+    frame = SimpleNamespace(scale=0.5, centre=np.ones(3))
+    return (
+        numbers.faces,
+        numbers.kept,
+        *extract._write(mesh, numbers, frame, np.dtype(np.int64), parallel),
+    )
 
 
 def shifted(mesh):
@@ -179,6 +192,9 @@ def test_every_kernel_is_the_same_in_any_order(monkeypatch):
             assert changed or name in ("locate", "closest", "measure"), name
             current = copies[0]
             assert_valid(current)
+        written = in_every_way(lambda p: write_out(current, p))  # noqa: B023
+        for one in written[1:]:
+            same(written[0], one)
         packed = in_every_way(lambda p: compact(current, blocks, p, 0.1))  # noqa: B023
         for one in packed[1:]:
             assert_same_bits(packed[0], one)
