@@ -3,30 +3,85 @@
 >>> V2, F2 = remesh(V, F, L)  # doctest: +SKIP
 """
 
+from typing import TYPE_CHECKING, Any
+
 from .distance import SurfaceDistance, surface_distance
-from .errors import MeshFormatError, MeshInputError, OptionError, RemeshvecError
+from .errors import (
+    MeshFormatError,
+    MeshInputError,
+    OptionError,
+    RemeshvecError,
+    SingularSystemError,
+)
 from .mesh_files import MeshFile, read_mesh, write_mesh
 from .quality import Quality, quality
 from .remesh import remesh
 from .report import RemeshResult, Report
 from .sizing import Adaptive
 
+if TYPE_CHECKING:
+    from .editing import Editor, deform
+    from .fairing import fair
+    from .laplacians import cotangent_matrix, laplacian, vertex_areas
+    from .multiresolution import EditedSurface, MultiresolutionEditor
+    from .smoothing import smooth
+    from .solver import LaplacianSolver
+
 __version__ = "0.1.0"
 
 __all__ = [
     "Adaptive",
+    "EditedSurface",
+    "Editor",
+    "LaplacianSolver",
     "MeshFile",
     "MeshFormatError",
     "MeshInputError",
+    "MultiresolutionEditor",
     "OptionError",
     "Quality",
     "RemeshResult",
     "RemeshvecError",
     "Report",
+    "SingularSystemError",
     "SurfaceDistance",
+    "cotangent_matrix",
+    "deform",
+    "fair",
+    "laplacian",
     "quality",
     "read_mesh",
     "remesh",
+    "smooth",
     "surface_distance",
+    "vertex_areas",
     "write_mesh",
 ]
+
+# Imported when first asked for: they need scipy.sparse, which remeshing does not.
+_LATE = {
+    "EditedSurface": "multiresolution",
+    "Editor": "editing",
+    "LaplacianSolver": "solver",
+    "MultiresolutionEditor": "multiresolution",
+    "cotangent_matrix": "laplacians",
+    "deform": "editing",
+    "fair": "fairing",
+    "laplacian": "laplacians",
+    "smooth": "smoothing",
+    "vertex_areas": "laplacians",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(f".{_LATE[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LATE})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import MeshInputError, OptionError
 
-__all__ = ["as_faces", "as_mesh", "as_vertices", "positive_count"]
+__all__ = [
+    "as_array",
+    "as_faces",
+    "as_indices",
+    "as_mask",
+    "as_mesh",
+    "as_vertices",
+    "positive_count",
+    "positive_number",
+    "which",
+]
 
 
 def as_mesh(V: ArrayLike, F: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -74,7 +85,7 @@ def as_faces(F: ArrayLike, n_vertices: int) -> NDArray[np.int64]:
         low, high = int(array.min()), int(array.max())
         bad = np.flatnonzero(((array < 0) | (array >= n_vertices)).any(axis=1))
         raise MeshInputError(
-            f"{_which(bad, 'face')} of F name vertices outside 0 to {n_vertices - 1} "
+            f"{which(bad, 'face')} of F name vertices outside 0 to {n_vertices - 1} "
             f"(indices run from {low} to {high}); indices are 0-based"
         )
     return faces
@@ -87,6 +98,54 @@ def positive_count(value: Any, name: str) -> int:
     return int(value)
 
 
+def positive_number(value: Any, name: str, unit: str) -> float:
+    """Check an option that measures something."""
+    is_number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
+    if not is_number or not np.isfinite(float(value)) or not value > 0.0:
+        raise OptionError(f"{name} must be a positive number, in {unit}; got {value!r}")
+    return float(value)
+
+
+def as_mask(value: Any, count: int, name: str, noun: str) -> NDArray[np.bool_]:
+    """Mask of faces or vertices from a mask or from indices, a copy."""
+    array = as_array(value, name)
+    if array.dtype == np.bool_:
+        if array.shape != (count,):
+            raise OptionError(f"{name} as a mask must have shape ({count},); got {array.shape}")
+        return array.copy()
+    mask = np.zeros(count, np.bool_)
+    mask[as_indices(array, count, name, noun)] = True
+    return mask
+
+
+def as_indices(value: Any, count: int, name: str, noun: str) -> NDArray[np.int64]:
+    """Check the indices that an option gives."""
+    array = as_array(value, name)
+    if array.size == 0:
+        return np.empty(0, np.int64)
+    if array.ndim != 1 or array.dtype.kind not in "iu":
+        raise OptionError(
+            f"{name} must hold {noun} indices; got shape {array.shape} of {array.dtype}"
+        )
+    bad = np.flatnonzero((array < 0) | (array >= count))
+    if len(bad):
+        raise OptionError(
+            f"{name}[{bad[0]}] = {array[bad[0]]} is no {noun} index; they run from 0 to {count - 1}"
+        )
+    return array.astype(np.int64)
+
+
+def as_array(value: Any, name: str) -> NDArray[Any]:
+    """Check that an option is an array of numbers."""
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise OptionError(f"{name} is no rectangular array: {error}") from error
+    if array.dtype == object:
+        raise OptionError(f"{name} is no rectangular array of numbers")
+    return array
+
+
 def _check_finite(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
     """Refuse NaN and infinity, but for vertices that no face uses."""
     with np.errstate(invalid="ignore", over="ignore"):
@@ -96,7 +155,7 @@ def _check_finite(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
     bad = np.flatnonzero(is_bad & (np.bincount(F.ravel(), minlength=len(V)) > 0))
     if len(bad):
         raise MeshInputError(
-            f"{_which(bad, 'vertex')} of V are NaN or infinite; "
+            f"{which(bad, 'vertex')} of V are NaN or infinite; "
             "remove them and their faces, or repair the coordinates"
         )
 
@@ -111,7 +170,7 @@ def _as_array(value: ArrayLike, name: str) -> NDArray[Any]:
     return array
 
 
-def _which(indices: NDArray[np.intp], noun: str) -> str:
+def which(indices: NDArray[np.intp], noun: str) -> str:
     """Name some elements: ``3 faces (12, 40, 41)``."""
     shown = ", ".join(str(i) for i in indices[:5]) + (", ..." if len(indices) > 5 else "")
     plural = {"vertex": "vertices"}.get(noun, noun + "s")

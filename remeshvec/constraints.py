@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ._check import as_array, as_indices, as_mask
 from ._types import NONE, IndexArray, Mesh
 from .errors import OptionError
 from .halfedge import ends_of
@@ -142,14 +143,14 @@ def make_constraints(
         An index out of range, an array of the wrong shape, an edge that the mesh does not have, an
         angle or a mode that does not exist.
     """
-    fixed = None if fixed_faces is None else _face_mask(fixed_faces, len(F), "fixed_faces")
+    fixed = None if fixed_faces is None else as_mask(fixed_faces, len(F), "fixed_faces", "face")
     unselected = None
     if selection is not None:
-        unselected = ~_face_mask(selection, len(F), "selection")
+        unselected = ~as_mask(selection, len(F), "selection", "face")
         fixed = unselected if fixed is None else fixed | unselected
     labels = None
     if face_labels is not None:
-        labels = _array(face_labels, "face_labels")
+        labels = as_array(face_labels, "face_labels")
         if labels.shape != (len(F),) or labels.dtype.kind not in "iub":
             raise OptionError(
                 f"face_labels must hold one whole number a face, shape ({len(F)},); "
@@ -161,7 +162,7 @@ def make_constraints(
         _edges(feature_edges, n, F),
         np.empty(0, np.int64)
         if fixed_vertices is None
-        else _indices(fixed_vertices, n, "fixed_vertices", "vertex"),
+        else as_indices(fixed_vertices, n, "fixed_vertices", "vertex"),
         fixed,
         labels,
         unselected,
@@ -185,22 +186,10 @@ def _mode(value: Any) -> str:
     return value
 
 
-def _face_mask(value: Any, m: int, name: str) -> BoolArray:
-    """Mask of faces from a mask or from indices."""
-    array = _array(value, name)
-    if array.dtype == np.bool_:
-        if array.shape != (m,):
-            raise OptionError(f"{name} as a mask must have shape ({m},); got {array.shape}")
-        return array.copy()
-    mask = np.zeros(m, np.bool_)
-    mask[_indices(array, m, name, "face")] = True
-    return mask
-
-
 def _edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:
     if value is None:
         return np.empty((0, 2), np.int64)
-    array = _array(value, "feature_edges")
+    array = as_array(value, "feature_edges")
     if array.size == 0:
         return np.empty((0, 2), np.int64)
     if array.ndim != 2 or array.shape[1] != 2:
@@ -208,7 +197,7 @@ def _edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:
             f"feature_edges must have shape (k, 2), two vertices a row; got {array.shape}"
         )
     edges = np.stack(
-        [_indices(array[:, i], n, f"feature_edges[:, {i}]", "vertex") for i in (0, 1)], 1
+        [as_indices(array[:, i], n, f"feature_edges[:, {i}]", "vertex") for i in (0, 1)], 1
     )
     known = ends_of(F.ravel(), _sides(F.ravel(), None, edges.T))
     bad = np.flatnonzero(~np.isin(edge_keys(edges.T, n), edge_keys(known, n)))
@@ -219,29 +208,3 @@ def _edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:
             f"vertices {a} and {b}"
         )
     return edges
-
-
-def _indices(value: Any, count: int, name: str, noun: str) -> NDArray[np.int64]:
-    array = _array(value, name)
-    if array.size == 0:
-        return np.empty(0, np.int64)
-    if array.ndim != 1 or array.dtype.kind not in "iu":
-        raise OptionError(
-            f"{name} must hold {noun} indices; got shape {array.shape} of {array.dtype}"
-        )
-    bad = np.flatnonzero((array < 0) | (array >= count))
-    if len(bad):
-        raise OptionError(
-            f"{name}[{bad[0]}] = {array[bad[0]]} is no {noun} index; they run from 0 to {count - 1}"
-        )
-    return array.astype(np.int64)
-
-
-def _array(value: Any, name: str) -> NDArray[Any]:
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError) as error:
-        raise OptionError(f"{name} is no rectangular array: {error}") from error
-    if array.dtype == object:
-        raise OptionError(f"{name} is no rectangular array of numbers")
-    return array

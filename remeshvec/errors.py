@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-__all__ = ["MeshFormatError", "MeshInputError", "OptionError", "RemeshvecError"]
+__all__ = [
+    "MeshFormatError",
+    "MeshInputError",
+    "OptionError",
+    "RemeshvecError",
+    "SingularSystemError",
+]
 
 
 class RemeshvecError(Exception):
@@ -19,3 +25,7 @@ class OptionError(RemeshvecError, ValueError):
 
 class MeshFormatError(RemeshvecError, ValueError):
     """A mesh file cannot be read or written; names the file and the reason."""
+
+
+class SingularSystemError(RemeshvecError, ValueError):
+    """A linear system has no single solution; names what is missing (fixed vertices, a finite entry)."""

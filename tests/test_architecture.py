@@ -30,7 +30,10 @@ LEVELS = {
         "options", "constraints", "prepare", "lengths", "reference", "seams", "deviation",
         "report", "sweeps", "extract", "remesh",
     ],
-    6: ["_file_guards", "_ply_guard", "_mesh_writers", "mesh_files"],
+    6: [
+        "laplacians", "solver", "motion", "fairing", "editing", "multiresolution", "smoothing",
+        "_file_guards", "_ply_guard", "_mesh_writers", "mesh_files",
+    ],
     7: ["viz", "_arguments", "_array_files", "cli"],
     8: ["__main__"],
 }  # fmt: skip
@@ -57,6 +60,10 @@ SIDEWAYS = {
     *(("remesh", name) for name in (
         "options", "constraints", "prepare", "lengths", "reference", "sweeps", "extract", "report",
     )),
+    ("fairing", "laplacians"), ("fairing", "solver"),
+    ("editing", "fairing"), ("editing", "laplacians"),
+    *(("multiresolution", name) for name in ("editing", "fairing", "laplacians", "motion")),
+    ("smoothing", "laplacians"), ("smoothing", "solver"),
     ("_ply_guard", "_file_guards"),
     ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
     ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"),
