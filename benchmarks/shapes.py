@@ -1,4 +1,4 @@
-"""Shapes of the pictures that no file in ``data`` has: sheets with drawn lines, and soap films."""
+"""Shapes of the pictures that no file in ``data`` has: sheets with drawn lines, soap films, a bar."""
 
 from __future__ import annotations
 
@@ -127,3 +127,44 @@ def _is_inside(P: FloatArray, polygon: FloatArray) -> NDArray[np.bool_]:
     with np.errstate(divide="ignore", invalid="ignore"):
         cross = a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
     return (spans & (x < cross)).sum(axis=1) % 2 == 1
+
+
+def bumpy_bar(
+    around: int = 48, length: float = 6.0, height: float = 0.06, bumps: int = 8, flat: float = 1.0
+) -> tuple[FloatArray, IntArray]:
+    """Bar with rounded edges along x, 1 thick, closed, with rows of bumps; its ends are smooth.
+
+    ``around`` is the number of vertices around it, ``bumps`` that of bumps, ``flat`` the length of the
+    smooth ends.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, 4001)
+    rim = _superellipse(turn)
+    arc = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(rim, axis=0), axis=1)))
+    rows = round(length / (arc[-1] / around * np.sqrt(0.75)))
+    V = []
+    for j in range(rows + 1):
+        share = (np.arange(around) + 0.5 * (j % 2)) / around
+        x = length * j / rows
+        ring = _superellipse(np.interp(share * arc[-1], arc, turn))
+        fade = np.clip(min(x - flat, length - flat - x) / 0.3, 0.0, 1.0)
+        wave = np.sin(2.0 * np.pi * bumps * share) * np.sin(2.0 * np.pi * bumps * x / arc[-1])
+        outwards = ring / np.linalg.norm(ring, axis=1, keepdims=True)
+        ring = ring + (height * fade * np.maximum(wave, 0.0))[:, None] * outwards
+        V.append(np.column_stack([np.full(around, x), ring]))
+    V.append([[0.0, 0.0, 0.0], [length, 0.0, 0.0]])
+    i = np.arange(around)
+    following = (i + 1) % around
+    F = []
+    for j in range(rows):
+        a, b, c, d = around * j + np.array([i, following, i + around, following + around])
+        F += [(a, b, c), (b, d, c)] if j % 2 == 0 else [(a, b, d), (a, d, c)]
+    first = np.full(around, around * (rows + 1))
+    last = around * rows
+    F += [(following, i, first), (last + i, last + following, first + 1)]
+    return np.concatenate(V), np.concatenate([np.column_stack(face) for face in F])
+
+
+def _superellipse(turn: FloatArray) -> FloatArray:
+    """Points of ``y^4 + z^4 = 1/16``."""
+    c, s = np.cos(turn), np.sin(turn)
+    return np.column_stack([c, s]) * (0.5 / (c**4 + s**4) ** 0.25)[:, None]

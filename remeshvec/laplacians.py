@@ -80,11 +80,13 @@ def vertex_areas(V: ArrayLike, F: ArrayLike, area: Area = "voronoi") -> FloatArr
     if area not in AREAS:
         raise OptionError(f"area must be one of {', '.join(AREAS)}; got {area!r}")
     vertices, faces = as_mesh(V, F)
-    areas = igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
+    found = igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
+    areas = np.zeros(len(vertices))
+    areas[: len(found)] = found  # libigl leaves out what comes after the last corner
     if area == "uniform":
         is_used = np.bincount(faces.ravel(), minlength=len(vertices)) > 0
         areas = np.where(is_used, igl.doublearea(vertices, faces).sum() / 2 / is_used.sum(), 0.0)
-    return np.asarray(areas)
+    return areas
 
 
 def laplacian(

@@ -9,6 +9,9 @@ from ._types import FloatArray
 
 __all__ = ["part_of_motion", "rotations_between"]
 
+# Radians below which the axis of a screw is too far away to be turned about.
+_NO_TURN = 1e-6
+
 
 def part_of_motion(
     affine: NDArray[np.float64], centre: FloatArray, points: FloatArray, w: FloatArray
@@ -42,14 +45,14 @@ def part_of_motion(
     omega = Rotation.from_matrix(rotation).as_rotvec()
     angle = float(np.linalg.norm(omega))
     shift = affine[:, :3] @ centre + affine[:, 3] - centre
-    if angle < 1e-12:
-        return np.asarray(centre + away + w[:, None] * shift)
-    # The axis of the screw: what is left of the shift across it is a turn about a point.
+    turns = Rotation.from_rotvec(w[:, None] * omega)
+    if angle < _NO_TURN:
+        return np.asarray(centre + turns.apply(away) + w[:, None] * shift)
+    # What a shift has across the axis is a turn about a point.
     axis = omega / angle
     along = axis * (axis @ shift)
     across = shift - along
     pivot = 0.5 * (across + np.cross(axis, across) / np.tan(0.5 * angle))
-    turns = Rotation.from_rotvec(w[:, None] * omega)
     return np.asarray(centre + pivot + turns.apply(away - pivot) + w[:, None] * along)
 
 

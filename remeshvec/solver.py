@@ -21,7 +21,7 @@ METHODS = ("auto", "cholesky", "lu")
 _SYMMETRY = 1e-12
 
 # Rows that sum to less, relative to the sum of absolute values, sum to 0: constants solve them.
-_ZERO_SUM = 1e-9
+_ZERO_SUM = 1e-13
 
 # Residual beyond which a factor is useless, relative to |A| |x| + |b|.
 _RESIDUAL = 1e-6
