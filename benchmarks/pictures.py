@@ -30,6 +30,7 @@ from .panels import (
     cut_open,
     draw,
 )
+from .scenes import bend, bump, smoothing, twist
 from .shapes import double_bubble, flag, half_discs, notched_sheet
 from .tables import DOCS
 
@@ -206,6 +207,10 @@ PICTURES: dict[str, Callable[[], Picture]] = {
         non_manifold,
         max_deviation,
         thin_sheet,
+        bump,
+        twist,
+        bend,
+        smoothing,
     )
 }
 

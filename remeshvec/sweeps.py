@@ -167,11 +167,10 @@ class Sweeps:
         Once all that is left is edges that are split and collapsed again and again, because their
         place has room for neither one nor two, those stay whose halves would soon be collapsed.
         """
-        edges = 1.5 * np.count_nonzero(mesh.origin[::3] != DEAD)
         done = [counts["split"] + counts["collapse"] for counts in self.counts[-_CYCLE:]]
-        few = max(_CALM * edges, 10.0)
-        if len(done) == _CYCLE and done[-1] < few and min(done) > 0.7 * max(done):
-            self.is_calm = True
+        if len(done) == _CYCLE and min(done) > 0.7 * max(done):
+            edges = 1.5 * np.count_nonzero(mesh.origin[::3] != DEAD)
+            self.is_calm |= done[-1] < max(_CALM * edges, 10.0)
         factor = self.options.split[sweep]
         return max(factor, 2.5 * self.options.collapse[sweep]) if self.is_calm else factor
 

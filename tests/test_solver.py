@@ -1,5 +1,8 @@
 """The solver: solutions, which factorisation, and errors before factoring."""
 
+import sys
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -14,6 +17,8 @@ from remeshvec import (
     laplacian,
     vertex_areas,
 )
+
+needs_cholespy = pytest.mark.skipif(not find_spec("cholespy"), reason="cholespy is not installed")
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +39,7 @@ def residual(A, x, b, free):
         ("uniform", "auto", "cholesky"),
         ("uniform", "lu", "lu"),
         ("uniform", "cholesky", "cholesky"),
+        pytest.param("uniform", "cholmod", "cholmod", marks=needs_cholespy),
         ("voronoi", "auto", "lu"),
     ],
 )
@@ -109,6 +115,30 @@ def test_singular_matrices_that_constants_do_not_solve(mesh):
         LaplacianSolver(laplacian(*mesh, symmetric=True))
 
 
+@needs_cholespy
+def test_cholmod_says_what_is_wrong(mesh):
+    A = laplacian(*mesh, "uniform")
+    b = np.random.default_rng(0).normal(size=(A.shape[0], 200))
+    one, two = (LaplacianSolver(A, [5], method).solve(b) for method in ("cholesky", "cholmod"))
+    assert one == pytest.approx(two, rel=1e-9, abs=1e-9)
+    with pytest.raises(OptionError, match="symmetric"):
+        LaplacianSolver(laplacian(*mesh), [0], "cholmod")
+    with pytest.raises(SingularSystemError):
+        LaplacianSolver(laplacian(*mesh, symmetric=True), None, "cholmod")
+    coupled = sp.coo_array(([1e3, 1e3], ([0, 1], [1, 0])), A.shape)
+    indefinite = coupled - cotangent_matrix(*mesh) + 0.1 * sp.eye_array(A.shape[0])
+    with pytest.raises(SingularSystemError):
+        LaplacianSolver(indefinite, None, "cholmod")
+    with pytest.raises(SingularSystemError):
+        LaplacianSolver(indefinite, None, "cholesky")
+
+
+def test_cholmod_may_be_absent(mesh, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cholespy", None)
+    with pytest.raises(OptionError, match=r"remeshvec\[cholmod\]"):
+        LaplacianSolver(laplacian(*mesh, "uniform"), [0], "cholmod")
+
+
 def test_bad_input(mesh):
     A = laplacian(*mesh, "uniform")
     n = A.shape[0]
@@ -120,7 +150,7 @@ def test_bad_input(mesh):
         LaplacianSolver(broken, [0])
     with pytest.raises(OptionError, match="fixed"):
         LaplacianSolver(A, [n])
-    with pytest.raises(OptionError, match="auto, cholesky, lu"):
+    with pytest.raises(OptionError, match="auto, cholesky, cholmod, lu"):
         LaplacianSolver(A, [0], "qr")
     with pytest.raises(OptionError, match="symmetric"):
         LaplacianSolver(laplacian(*mesh), [0], "cholesky")
