@@ -250,7 +250,7 @@ def _page(
         "SuperLU; the remeshed surface has as many vertices, the same area for all, and a sparse "
         "Cholesky factorisation: that of libigl, or CHOLMOD. Beside them the original once more as "
         "`C x = M b`, which is symmetric without remeshing. One vertex of every component is fixed. "
-        f"Medians of {REPEATS}; totals are the factor and n / {BLOCK} blocks of {BLOCK} right-hand sides.",
+        f"Medians of {REPEATS}; totals are the factor and n / {BLOCK} blocks of {BLOCK} columns.",
         table(
             [
                 "mesh",

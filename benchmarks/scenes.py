@@ -67,7 +67,7 @@ def smoothing() -> Picture:
     noise = np.random.default_rng(0).normal(size=V.shape)
     noisy = V + 0.006 * noise
     panels = [Panel("noisy", noisy, F)]
-    for step in (0.03**2, 0.15**2):
+    for step in (0.015**2, 0.06**2):
         W = smooth(noisy, F, step, 3, keep_volume=True)
         panels.append(Panel(f"three steps of {step:.2g}, volume kept", W, F))
     return Picture(panels, view=(20.0, 15.0))
