@@ -34,7 +34,10 @@ LEVELS = {
         "laplacians", "solver", "motion", "fairing", "editing", "multiresolution", "smoothing",
         "_file_guards", "_ply_guard", "_mesh_writers", "mesh_files",
     ],
-    7: ["viz", "_arguments", "_array_files", "cli"],
+    7: [
+        "evolver", "evolver.energies", "evolver.problem", "evolver.minimize",
+        "viz", "_arguments", "_array_files", "cli",
+    ],
     8: ["__main__"],
 }  # fmt: skip
 SIDEWAYS = {
@@ -66,6 +69,7 @@ SIDEWAYS = {
     ("smoothing", "laplacians"), ("smoothing", "solver"),
     ("_ply_guard", "_file_guards"),
     ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
+    ("evolver.problem", "evolver.energies"), ("evolver.minimize", "evolver.problem"),
     ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"),
 }  # fmt: skip
 LEVEL = {name: level for level, names in LEVELS.items() for name in names}

@@ -1,0 +1,1 @@
+"""Capillary surfaces: minimised natively or by Surface Evolver, remeshed as they evolve."""

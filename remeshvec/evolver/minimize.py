@@ -1,0 +1,338 @@
+"""Minimise the energy of a capillary surface at prescribed volumes: a flow, and Newton's method.
+
+Both work with the Lagrangian, energy minus pressure times volume. After every step volumes are restored
+exactly, so the energies of a history can be compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from .._check import positive_count, positive_number
+from .._types import FloatArray
+from ..errors import OptionError
+from ..laplacians import cotangent_matrix
+from ..solver import LaplacianSolver
+from .problem import CapillaryProblem, Forces
+
+__all__ = ["Minimum", "minimize"]
+
+# Halvings of a step before it counts as impossible.
+_HALVINGS = 12
+
+# Corrections of the volume after a step; each squares the error.
+_CORRECTIONS = 20
+_VOLUME_ERROR = 1e-12  # relative
+
+# Part of the stiffness matrix, and of the Hessian, that holds components without fixed vertices in place.
+_GAUGE = 1e-4
+
+# Shifts of a Hessian that is not positive where it has to be: the first, and the factor between them.
+_FIRST_SHIFT, _SHIFT_FACTOR, _SHIFTS = 1e-3, 8.0, 14
+
+
+@dataclass
+class Minimum:
+    """Where a minimisation ended.
+
+    Attributes
+    ----------
+    problem : CapillaryProblem
+        The problem with its surface where it ended.
+    energy, area, volume : float
+        Offsets included.
+    pressure : (g,) float64
+        Of every body: the Lagrange multiplier of its volume, the derivative of the least energy.
+    residual : float
+        Root of the mean square of the normal force density on free vertices, energy gradient minus
+        pressure, times the square root of the area over the tension: no unit.
+    converged : bool
+        The residual is below the tolerance.
+    stop : str
+        Why it ended.
+    history : list of dict
+        "energy" and "residual" after every step.
+    """
+
+    problem: CapillaryProblem
+    energy: float
+    area: float
+    volume: float
+    pressure: FloatArray
+    residual: float
+    converged: bool
+    stop: str
+    history: list[dict[str, float]] = field(default_factory=list)
+
+    @property
+    def V(self) -> FloatArray:
+        """Vertices (n, 3)."""
+        return self.problem.V
+
+    @property
+    def F(self) -> NDArray[np.int64]:
+        """Faces (m, 3)."""
+        return self.problem.F
+
+
+Callback = Callable[[int, CapillaryProblem, float, float], object]
+
+
+def minimize(
+    problem: CapillaryProblem,
+    method: Literal["flow", "newton"] = "flow",
+    *,
+    tol: float = 1e-6,
+    steps: int | None = None,
+    callback: Callback | None = None,
+) -> Minimum:
+    """Move the free vertices to where the energy is least, on the triangles that there are.
+
+    Parameters
+    ----------
+    problem : CapillaryProblem
+        Not changed.
+    method : {"flow", "newton"}
+        "flow": descent with the cotangent Laplacian as the metric [Pinkall and Polthier 1993, section
+        4], robust from any start, linear convergence. "newton": one degree of freedom a vertex, along
+        its normal; the Hessian of the Lagrangian, bordered by the volumes, is shifted until it is
+        positive on all motions that keep them, which its inertia tells; quadratic convergence near a
+        minimum. Triangles do not get better by either: `evolve` remeshes in between.
+    tol : float
+        Residual at which to stop, see `Minimum`.
+    steps : int, optional
+        At most so many; by default 200 for the flow and 50 for Newton's method.
+    callback : callable, optional
+        Called as ``callback(step, problem, energy, residual)`` after every step; False ends it.
+
+    Returns
+    -------
+    Minimum
+
+    Raises
+    ------
+    OptionError
+        Options that do not exist.
+    MeshInputError
+        A face without area.
+    """
+    tolerance = positive_number(tol, "tol", "no unit")
+    if method not in ("flow", "newton"):
+        raise OptionError(f"method must be one of flow, newton; got {method!r}")
+    most = positive_count({"flow": 200, "newton": 50}[method] if steps is None else steps, "steps")
+    advance = _flow_step if method == "flow" else _newton_step
+    if not problem.free.any():
+        return _minimum(problem, np.zeros(len(problem.targets)), 0.0, tolerance, "all is fixed", [])
+    now = problem.with_mesh(_with_volumes(problem, problem.V, problem.forces().volume))
+    history: list[dict[str, float]] = []
+    pressure, residual = _balance(now, now.forces())
+    stop = "all steps done"
+    for step in range(most):
+        if residual <= tolerance:
+            stop = "converged"
+            break
+        moved = advance(now, now.forces(), pressure)
+        if moved is None:
+            stop = "no step lowers the energy"
+            break
+        now = now.with_mesh(moved)
+        pressure, residual = _balance(now, now.forces())
+        history.append({"energy": now.energy(), "residual": residual})
+        if callback is not None and callback(step, now, now.energy(), residual) is False:
+            stop = "cancelled"
+            break
+    else:
+        stop = "converged" if residual <= tolerance else stop
+    return _minimum(now, pressure, residual, tolerance, stop, history)
+
+
+def _minimum(
+    now: CapillaryProblem,
+    pressure: FloatArray,
+    residual: float,
+    tolerance: float,
+    stop: str,
+    history: list[dict[str, float]],
+) -> Minimum:
+    return Minimum(
+        now,
+        now.energy(),
+        now.area(),
+        now.total_volume(),
+        pressure,
+        residual,
+        residual <= tolerance,
+        stop,
+        history,
+    )
+
+
+# --- forces and volumes --------------------------------------------------------------------------
+
+
+def _normals(problem: CapillaryProblem) -> tuple[FloatArray, FloatArray]:
+    """Return unit normals (n, 3) and areas (n,) of vertices, from the faces around each."""
+    T = problem.V[problem.F]
+    N = np.cross(T[:, 1] - T[:, 0], T[:, 2] - T[:, 0]) / 6.0
+    index = problem.F.ravel()
+    each = np.repeat(N, 3, axis=0)
+    total = np.stack([np.bincount(index, each[:, c], len(problem.V)) for c in range(3)], axis=1)
+    size = np.linalg.norm(total, axis=1)
+    area = np.bincount(index, np.repeat(np.linalg.norm(N, axis=1), 3), len(problem.V))
+    unit = total / np.maximum(size, np.finfo(float).tiny)[:, None]
+    return np.asarray(unit), np.asarray(area, np.float64)
+
+
+def _balance(problem: CapillaryProblem, forces: Forces) -> tuple[FloatArray, float]:
+    """Pressures that balance the forces best, and what is left of them (see `Minimum.residual`)."""
+    normal, area = _normals(problem)
+    free = np.flatnonzero(problem.free & (area > 0.0))
+    weight = 1.0 / np.sqrt(area[free])
+    force = np.einsum("nx,nx->n", forces.energy, normal)[free] * weight
+    volume = np.einsum("gnx,nx->gn", forces.volume, normal)[:, free]
+    held = np.column_stack([volume.T, _gauge(problem, normal, area, free)]) * weight[:, None]
+    multiplier = np.linalg.lstsq(held, force, rcond=None)[0]
+    rest = force - held @ multiplier
+    scale = problem.tension / np.sqrt(problem.area())
+    residual = float(np.sqrt((rest**2).sum() / area[free].sum())) / scale
+    return multiplier[: len(volume)], residual
+
+
+def _with_volumes(problem: CapillaryProblem, X: FloatArray, directions: FloatArray) -> FloatArray:
+    """Restore the volumes by moving along one field (g, n, 3) a body."""
+    if not len(problem.targets):
+        return X
+    free = problem.free[None, :, None]
+    along = np.where(free, directions, 0.0)
+    scale = np.maximum(np.abs(problem.targets), np.abs(problem.body_volumes(X))).max()
+    for _ in range(_CORRECTIONS):
+        error = problem.targets - problem.body_volumes(X)
+        if np.abs(error).max() <= _VOLUME_ERROR * scale:
+            break
+        gain = np.einsum("gnx,hnx->gh", problem.forces(X).volume, along)
+        X = X + np.einsum("h,hnx->nx", np.linalg.lstsq(gain, error, rcond=None)[0], along)
+    return X
+
+
+def _searched(
+    problem: CapillaryProblem, step: FloatArray, directions: FloatArray, slack: float
+) -> FloatArray | None:
+    """Longest of the halved steps that lowers the energy, with the volumes restored."""
+    before = problem.energy()
+    size = 1.0
+    for _ in range(_HALVINGS):
+        X = _with_volumes(problem, problem.V + size * step, directions)
+        energy = problem.energy(X)
+        if np.isfinite(energy) and energy <= before + slack * abs(before):
+            return X
+        size *= 0.5
+    return None
+
+
+# --- flow ----------------------------------------------------------------------------------------
+
+
+def _flow_step(problem: CapillaryProblem, forces: Forces, _: FloatArray) -> FloatArray | None:
+    """Step along the gradient in the metric of the surface's own stiffness matrix."""
+    C = cotangent_matrix(problem.V, problem.F)
+    area = np.maximum(_normals(problem)[1], np.finfo(float).tiny)
+    K = problem.tension * (-C + _GAUGE * sp.diags_array(area) * (1.0 / area.sum()))
+    solver = LaplacianSolver(K, problem.fixed)
+    sides = [forces.energy, *forces.volume]
+    solved = np.split(solver.solve(np.concatenate(sides, axis=1)), len(sides), axis=1)
+    down, lift = solved[0], np.array(solved[1:]).reshape(-1, *problem.V.shape)
+    gain = np.einsum("gnx,hnx->gh", forces.volume, lift)
+    rate = np.einsum("gnx,nx->g", forces.volume, down)
+    pressure = np.linalg.lstsq(gain, rate, rcond=None)[0] if len(gain) else rate
+    step = -down + np.einsum("h,hnx->nx", pressure, lift)
+    return _searched(problem, step, lift, 0.0)
+
+
+# --- Newton --------------------------------------------------------------------------------------
+
+
+def _newton_step(
+    problem: CapillaryProblem, forces: Forces, pressure: FloatArray
+) -> FloatArray | None:
+    """Step of normal motions to where the quadratic model of the Lagrangian is stationary."""
+    normal, area = _normals(problem)
+    free = np.flatnonzero(problem.free & (area > 0.0))
+    H = problem.hessian(normal[:, None], pressure)[free][:, free]
+    H = sp.csc_array((H + H.T) * 0.5)
+    force = np.einsum("nx,nx->n", forces.energy, normal)[free]
+    G = np.einsum("gnx,nx->gn", forces.volume, normal)[:, free].T
+    gauge = _gauge(problem, normal, area, free)
+    border = np.concatenate([G, gauge], axis=1)
+    missing = np.concatenate([problem.targets - problem.body_volumes(), np.zeros(gauge.shape[1])])
+    u = _constrained(H, sp.diags_array(area[free]), border, -force, missing, problem)
+    if u is None:
+        return None
+    step = np.zeros_like(problem.V)
+    step[free] = u[:, None] * normal[free]
+    # Near the minimum energies differ by rounding only; there the step is right by itself.
+    small = np.abs(u).max() < 1e-5 * np.sqrt(area.sum())
+    return _searched(problem, step, forces.volume, 1e-13 if small else 0.0)
+
+
+def _gauge(
+    problem: CapillaryProblem, normal: FloatArray, area: FloatArray, free: NDArray[np.intp]
+) -> FloatArray:
+    """Return the translations (k, 3 c) of components without any fixed vertex: no force holds these."""
+    _, part = problem.components()
+    held = np.unique(part[problem.fixed[problem.F].any(axis=1)])
+    columns = []
+    for name in np.setdiff1d(part, held):
+        mine = np.zeros(len(problem.V))
+        mine[problem.F[part == name]] = 1.0
+        columns.append((normal * (mine * area)[:, None])[free])
+    return np.concatenate(columns, axis=1) if columns else np.empty((len(free), 0))
+
+
+def _constrained(
+    H: sp.csc_array,
+    M: sp.dia_array,
+    border: FloatArray,
+    right: FloatArray,
+    missing: FloatArray,
+    problem: CapillaryProblem,
+) -> FloatArray | None:
+    """Solve the bordered system, with H shifted until it is positive where the border vanishes.
+
+    The bordered matrix has as many negative eigenvalues as the border has columns, and no more, if and
+    only if H is positive there; they are counted in the factor of H and in its Schur complement.
+    """
+    scale = problem.tension / problem.area()
+    shift = 0.0
+    for k in range(_SHIFTS):
+        factor, negative = _factored(sp.csc_array(H + shift * M))
+        if factor is not None:
+            solved = factor(np.column_stack([right, border]))
+            u, lifted = solved[:, 0], solved[:, 1:]
+            schur = border.T @ lifted
+            if negative + int((np.linalg.eigvalsh(-0.5 * (schur + schur.T)) < 0.0).sum()) == len(
+                schur
+            ):
+                if not len(schur):
+                    return np.asarray(u)
+                multiplier = np.linalg.solve(schur, missing - border.T @ u)
+                return np.asarray(u + lifted @ multiplier)
+        shift = scale * _FIRST_SHIFT * _SHIFT_FACTOR**k
+    return None
+
+
+def _factored(A: sp.csc_array) -> tuple[Callable[[FloatArray], FloatArray] | None, int]:
+    """Factor a symmetric matrix with pivots on its diagonal; also counts its negative eigenvalues."""
+    try:
+        factor = splu(A, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
+    except RuntimeError:
+        return None, 0
+    if not np.array_equal(factor.perm_r, factor.perm_c):
+        return None, 0  # a pivot of zero
+    return factor.solve, int((factor.U.diagonal() < 0.0).sum())
