@@ -51,10 +51,10 @@ def cotangent_matrix(V: ArrayLike, F: ArrayLike) -> sp.csc_array:
     vertices, faces = as_mesh(V, F)
     C = igl.cotmatrix(vertices, faces)
     if not np.isfinite(C.data).all():
-        flat = np.flatnonzero(~(igl.doublearea(vertices, faces) > 0.0))
+        flat = np.flatnonzero(~np.isfinite(igl.cotmatrix_entries(vertices, faces)).all(axis=1))
         raise MeshInputError(
-            f"{which(flat, 'face')} of F have no area, so that cotangents are infinite; "
-            "remesh first, or drop them"
+            f"{which(flat, 'face')} of F have no area, or none but rounding errors, so that cotangents "
+            "are infinite; remesh first, or drop them"
         )
     # libigl adds up both halves in different orders.
     return sp.csc_array((C + C.T) * 0.5)

@@ -36,6 +36,7 @@ LEVELS = {
     ],
     7: [
         "evolver", "evolver.energies", "evolver.problem", "evolver.minimize",
+        "evolver.necks", "evolver.evolve",
         "viz", "_arguments", "_array_files", "cli",
     ],
     8: ["__main__"],
@@ -70,6 +71,8 @@ SIDEWAYS = {
     ("_ply_guard", "_file_guards"),
     ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
     ("evolver.problem", "evolver.energies"), ("evolver.minimize", "evolver.problem"),
+    ("evolver.necks", "evolver.energies"),
+    *(("evolver.evolve", f"evolver.{name}") for name in ("energies", "minimize", "necks", "problem")),
     ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"),
 }  # fmt: skip
 LEVEL = {name: level for level, names in LEVELS.items() for name in names}

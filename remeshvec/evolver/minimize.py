@@ -18,11 +18,10 @@ from scipy.sparse.linalg import splu
 from .._check import positive_count, positive_number
 from .._types import FloatArray
 from ..errors import OptionError
-from ..laplacians import cotangent_matrix
 from ..solver import LaplacianSolver
 from .problem import CapillaryProblem, Forces
 
-__all__ = ["Minimum", "minimize"]
+__all__ = ["Minimum", "minimize", "restore_volumes"]
 
 # Halvings of a step before it counts as impossible.
 _HALVINGS = 12
@@ -33,6 +32,9 @@ _VOLUME_ERROR = 1e-12  # relative
 
 # Part of the stiffness matrix, and of the Hessian, that holds components without fixed vertices in place.
 _GAUGE = 1e-4
+
+# Half cotangent of angles of 1.1 degrees: the metric of faces with smaller ones is noise.
+_SLIVER = 25.0
 
 # Shifts of a Hessian that is not positive where it has to be: the first, and the factor between them.
 _FIRST_SHIFT, _SHIFT_FACTOR, _SHIFTS = 1e-3, 8.0, 14
@@ -120,8 +122,6 @@ def minimize(
     ------
     OptionError
         Options that do not exist.
-    MeshInputError
-        A face without area.
     """
     tolerance = positive_number(tol, "tol", "no unit")
     if method not in ("flow", "newton"):
@@ -130,7 +130,7 @@ def minimize(
     advance = _flow_step if method == "flow" else _newton_step
     if not problem.free.any():
         return _minimum(problem, np.zeros(len(problem.targets)), 0.0, tolerance, "all is fixed", [])
-    now = problem.with_mesh(_with_volumes(problem, problem.V, problem.forces().volume))
+    now = problem.with_mesh(restore_volumes(problem))
     history: list[dict[str, float]] = []
     pressure, residual = _balance(now, now.forces())
     stop = "all steps done"
@@ -205,6 +205,11 @@ def _balance(problem: CapillaryProblem, forces: Forces) -> tuple[FloatArray, flo
     return multiplier[: len(volume)], residual
 
 
+def restore_volumes(problem: CapillaryProblem) -> FloatArray:
+    """Return vertices moved along normals until every body has its volume."""
+    return _with_volumes(problem, problem.V, problem.forces().volume)
+
+
 def _with_volumes(problem: CapillaryProblem, X: FloatArray, directions: FloatArray) -> FloatArray:
     """Restore the volumes by moving along one field (g, n, 3) a body."""
     if not len(problem.targets):
@@ -241,10 +246,9 @@ def _searched(
 
 def _flow_step(problem: CapillaryProblem, forces: Forces, _: FloatArray) -> FloatArray | None:
     """Step along the gradient in the metric of the surface's own stiffness matrix."""
-    C = cotangent_matrix(problem.V, problem.F)
     area = np.maximum(_normals(problem)[1], np.finfo(float).tiny)
-    K = problem.tension * (-C + _GAUGE * sp.diags_array(area) * (1.0 / area.sum()))
-    solver = LaplacianSolver(K, problem.fixed)
+    K = _stiffness(problem) + _GAUGE * sp.diags_array(area) * (1.0 / area.sum())
+    solver = LaplacianSolver(problem.tension * K, problem.fixed)
     sides = [forces.energy, *forces.volume]
     solved = np.split(solver.solve(np.concatenate(sides, axis=1)), len(sides), axis=1)
     down, lift = solved[0], np.array(solved[1:]).reshape(-1, *problem.V.shape)
@@ -253,6 +257,20 @@ def _flow_step(problem: CapillaryProblem, forces: Forces, _: FloatArray) -> Floa
     pressure = np.linalg.lstsq(gain, rate, rcond=None)[0] if len(gain) else rate
     step = -down + np.einsum("h,hnx->nx", pressure, lift)
     return _searched(problem, step, lift, 0.0)
+
+
+def _stiffness(problem: CapillaryProblem) -> sp.csc_array:
+    """Stiffness matrix of the surface, in which slivers count as equilateral."""
+    import igl
+
+    n, F = len(problem.V), problem.F
+    with np.errstate(all="ignore"):
+        weight = igl.cotmatrix_entries(problem.V, F)  # half cotangents of the corners
+    weight[~(np.abs(weight) < _SLIVER).all(axis=1)] = 0.5 / np.sqrt(3.0)
+    i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
+    off = sp.coo_array((-weight.ravel(), (i, j)), (n, n)).tocsc()
+    off = off + off.T
+    return sp.csc_array(off - sp.diags_array(off.sum(axis=1)))
 
 
 # --- Newton --------------------------------------------------------------------------------------

@@ -1,0 +1,185 @@
+"""Cut necks: closed curves of three or four edges are split, and both ends capped.
+
+Where a neck thins, remeshing collapses the short edges around it until three are left; the link
+condition forbids to collapse these. They are the place where the surface breaks.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from .._types import FloatArray
+from .energies import areas
+
+__all__ = ["Cut", "cut_necks"]
+
+IntArray = NDArray[np.int64]
+Cycle = tuple[int, ...]
+
+# A piece counts as hanging on a neck if its area is so many times that of the cap. Less is the base of a
+# cone, or a vertex with three faces.
+_PIECE = 8.0
+
+
+class Cut(NamedTuple):
+    """A surface after its necks were cut."""
+
+    V: FloatArray
+    F: IntArray
+    source: IntArray  # (n,) vertex of the input of every vertex
+    n_cuts: int
+
+
+def cut_necks(V: FloatArray, F: IntArray, held: NDArray[np.bool_], perimeter: float = 0.0) -> Cut:
+    """Cut every neck of three edges, and those of four that are short.
+
+    Parameters
+    ----------
+    V : (n, 3) float64
+    F : (m, 3) int
+        A manifold with faces of one winding.
+    held : (n,) bool
+        Vertices that no cut may go through.
+    perimeter : float
+        Longest perimeter of a neck of four edges.
+
+    Returns
+    -------
+    Cut
+        Also a manifold. Each cut adds its vertices and two caps.
+    """
+    source = np.arange(len(V))
+    count = 0
+    # One at a time: cuts may share edges, and each changes what others see. There are few.
+    while (cycle := _next_cycle(V, F, held[source], perimeter)) is not None:
+        V, F, source = _split(V, F, source, cycle)
+        count += 1
+    return Cut(V, F, source, count)
+
+
+def _next_cycle(
+    V: FloatArray, F: IntArray, held: NDArray[np.bool_], perimeter: float
+) -> Cycle | None:
+    """Return the shortest cycle that is a neck."""
+    sizes = []
+    for cycle in _cycles(F, held, len(V)):
+        P = V[list(cycle)]
+        size = float(np.linalg.norm(P - np.roll(P, 1, axis=0), axis=1).sum())
+        if len(cycle) == 3 or size <= perimeter:
+            sizes.append((size, cycle))
+    return next((cycle for _, cycle in sorted(sizes) if _is_neck(V, F, cycle)), None)
+
+
+def _cycles(F: IntArray, held: NDArray[np.bool_], n: int) -> list[Cycle]:
+    """Cycles of three edges that are no face, and of four without a diagonal."""
+    edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
+    edges = np.unique(edges[~held[edges].any(axis=1)], axis=0)
+    both = np.concatenate([edges, edges[:, ::-1]])
+    near = sp.csr_array((np.ones(len(both), np.int64), (both[:, 0], both[:, 1])), (n, n))
+    near.sort_indices()
+    # Ends of edges have as many common neighbours as the edge has faces, but for what is looked for.
+    paths = (near @ near).tocoo()
+    ahead = paths.row < paths.col
+    row, column, count = paths.row[ahead], paths.col[ahead], paths.data[ahead]
+    is_edge = np.asarray(near[row, column]).ravel() > 0
+    faces = {tuple(face) for face in np.sort(F, axis=1).tolist()}
+    cycles: list[Cycle] = []
+    for a, c in zip(
+        row[is_edge & (count > 2)].tolist(), column[is_edge & (count > 2)].tolist(), strict=True
+    ):
+        cycles += [(a, b, c) for b in _common(near, a, c) if tuple(sorted((a, b, c))) not in faces]
+    others = ~is_edge & (count > 1)
+    for a, c in zip(row[others].tolist(), column[others].tolist(), strict=True):
+        between = _common(near, a, c)
+        cycles += [(a, b, c, d) for b in between for d in between if b < d and near[b, d] == 0]
+    return list({tuple(sorted(cycle)): cycle for cycle in cycles}.values())
+
+
+def _common(near: sp.csr_array, a: int, b: int) -> list[int]:
+    """Neighbours that two vertices share."""
+    one, two = (near.indices[near.indptr[v] : near.indptr[v + 1]] for v in (a, b))
+    return [int(v) for v in np.intersect1d(one, two)]
+
+
+def _is_neck(V: FloatArray, F: IntArray, cycle: Cycle) -> bool:
+    """Tell whether something large hangs on both sides, or the same on both (a handle)."""
+    side = _side(F, cycle)
+    if side is None:
+        return False
+    area = areas(V[F])
+    cap = float(areas(V[_fan(cycle)]).sum())
+    for seeds in (side, _side(F, cycle[::-1])):
+        if seeds is None:
+            return False
+        reached = _reached(F, seeds, cycle)
+        if area[reached].sum() < _PIECE * cap or reached.sum() < 8:
+            return False
+    return True
+
+
+def _reached(F: IntArray, seeds: IntArray, cycle: Cycle) -> NDArray[np.bool_]:
+    """Faces that hang together with some across edges that are not on the cycle."""
+    m = len(F)
+    half = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    low, high = np.sort(half, axis=1).T
+    key = low * (F.max() + 1) + high
+    order = np.argsort(key, kind="stable")
+    same = key[order][1:] == key[order][:-1]
+    on_cycle = np.isin(low, cycle) & np.isin(high, cycle)
+    f, g = order[:-1][same], order[1:][same]
+    crossing = ~on_cycle[f]
+    f, g = f[crossing] % m, g[crossing] % m
+    graph = sp.coo_array((np.ones(len(f)), (f, g)), (m, m))
+    part = connected_components(graph, directed=False)[1]
+    return np.isin(part, part[seeds])
+
+
+def _side(F: IntArray, cycle: Cycle) -> IntArray | None:
+    """Faces at the corners of a cycle that lie on its left, walking along it; None if it has no sides.
+
+    At each corner they are the fan between the edge that comes and the edge that goes on.
+    """
+    after = {}
+    for corner in range(3):
+        a, b, c = F[:, corner], F[:, (corner + 1) % 3], F[:, (corner + 2) % 3]
+        for v in cycle:
+            for f in np.flatnonzero(a == v).tolist():
+                after[v, int(b[f])] = (f, int(c[f]))
+    faces = []
+    for i, v in enumerate(cycle):
+        came, goes = cycle[i - 1], cycle[(i + 1) % len(cycle)]
+        # Faces around v run counterclockwise: from the edge that goes on to the one that came.
+        w, steps = goes, 0
+        while w != came:
+            if (v, w) not in after or steps > len(after):
+                return None  # a boundary between
+            f, w = after[v, w]
+            faces.append(f)
+            steps += 1
+    return np.unique(faces)
+
+
+def _split(
+    V: FloatArray, F: IntArray, source: IntArray, cycle: Cycle
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Give the faces on the left of a cycle corners of their own there, and cap both sides."""
+    side, ring = _side(F, cycle), list(cycle)
+    copies = len(V) + np.arange(len(ring))
+    new = np.arange(len(V))
+    new[ring] = copies
+    F = F.copy()
+    F[side] = new[F[side]]
+    # Half-edges of the faces on the left run along the cycle, and so against it in their cap.
+    caps = [_fan(tuple(copies.tolist()[::-1])), _fan(cycle)]
+    return np.concatenate([V, V[ring]]), np.concatenate([F, *caps]), np.append(source, source[ring])
+
+
+def _fan(cycle: Cycle) -> IntArray:
+    """Triangles that fill a cycle, from its first vertex."""
+    return np.array([(cycle[0], b, c) for b, c in pairwise(cycle[1:])])
