@@ -28,8 +28,12 @@ _FLOW_STEPS = 4
 # Sine of the smallest angle below which triangles have to be replaced before the flow goes on.
 _SLIVER = 0.2
 
-# A sweep that lowers the energy by less, relative to it, is the last one of its length.
-_SETTLED = 1e-5
+# So many sweeps in a row that lower the energy by less, relative to it, are the last ones of a length;
+# unless forces grow, as they do for long where a surface is about to break.
+_SETTLED, _PATIENCE = 1e-5, 3
+
+# Times that Newton's method may lead so far away that the surface has to be remeshed.
+_RETURNS = 3
 
 # A component without wires and with less volume than this many cubed edge lengths is dropped.
 _CRUMB = 0.5
@@ -143,19 +147,13 @@ def evolve(
     if volume not in ("shared", "per_component"):
         raise OptionError(f"volume must be one of shared, per_component; got {volume!r}")
     run = _Run(problem, cut_necks, volume == "per_component", frames, callback)
+    reshape = (split, collapse) if remeshing else None
     for L in steps:
-        for _ in range(most):
-            if remeshing:
-                run.remesh(L, split, collapse)
-            if run.sweep(L):
-                break
-        if run.is_cancelled:
+        run.settle(L, most, reshape)
+    for _ in range(_RETURNS):
+        if run.finish(steps[-1], tol) or reshape is None:
             break
-    if not run.is_cancelled and len(run.now.F):
-        last = minimize(run.now, "newton", tol=tol)
-        if last.energy <= run.now.energy() * (1 + 1e-9) or last.converged:
-            run.now, run.minimum = last.problem, last
-        run.note(steps[-1], "newton")
+        run.settle(steps[-1], most, reshape)
     return Evolution(run.minimum, run.n_cuts, run.frames, run.history)
 
 
@@ -175,8 +173,29 @@ class _Run:
         self.minimum = minimize(self.now, "flow", steps=1)
         self.n_cuts = 0
         self.is_cancelled = False
+        self.best, self.idle = float("inf"), 0  # energy, sweeps since
         self.frames: list[Frame] = []
         self.history: list[dict[str, float]] = []
+
+    def settle(self, L: float, most: int, reshape: tuple[float, float] | None) -> None:
+        """Sweep until little changes."""
+        self.best, self.idle = float("inf"), 0
+        for _ in range(most):
+            if self.is_cancelled:
+                return
+            if reshape is not None:
+                self.remesh(L, *reshape)
+            if self.sweep(L):
+                return
+
+    def finish(self, L: float, tol: float) -> bool:
+        """Run Newton's method; tells whether the triangles are still good."""
+        if self.is_cancelled or not len(self.now.F):
+            return True
+        self.minimum = minimize(self.now, "newton", tol=tol, callback=_is_fit)
+        self.now = self.minimum.problem
+        self.note(L, "newton")
+        return self.minimum.stop != "cancelled" or self.minimum.converged
 
     def remesh(self, L: float, split: float, collapse: float) -> None:
         """Remesh all but the wires, and restore the volumes before anything else."""
@@ -211,13 +230,18 @@ class _Run:
 
     def sweep(self, L: float) -> bool:
         """Let the surface flow, and cut its necks; tells whether it has settled."""
-        before = self.now.energy()
         self.minimum = minimize(self.now, "flow", steps=_FLOW_STEPS, callback=_is_fit)
         self.now = self.minimum.problem
         event = self._cut(L) if self.cuts else "sweep"
         self.note(L, event)
-        change = before - self.now.energy()
-        return self.is_cancelled or (event == "sweep" and abs(change) <= _SETTLED * abs(before))
+        energy = self.now.energy()
+        if event != "sweep" or not energy >= self.best - _SETTLED * abs(energy):
+            self.best, self.idle = energy, 0
+        else:
+            self.idle += 1
+        residuals = [one["residual"] for one in self.history[-1 - _PATIENCE :]]
+        is_growing = self.minimum.residual > 1.02 * residuals[0]
+        return self.is_cancelled or (self.idle >= _PATIENCE and not is_growing)
 
     def _cut(self, L: float) -> str:
         now = self.now
