@@ -36,7 +36,7 @@ LEVELS = {
     ],
     7: [
         "evolver", "evolver.energies", "evolver.problem", "evolver.minimize",
-        "evolver.necks", "evolver.evolve",
+        "evolver.necks", "evolver.evolve", "evolver.errors", "evolver.surface_evolver",
         "viz", "_arguments", "_array_files", "cli",
     ],
     8: ["__main__"],
@@ -72,6 +72,7 @@ SIDEWAYS = {
     ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
     ("evolver.problem", "evolver.energies"), ("evolver.minimize", "evolver.problem"),
     ("evolver.necks", "evolver.energies"),
+    *(("evolver.surface_evolver", f"evolver.{name}") for name in ("errors", "minimize", "problem")),
     *(("evolver.evolve", f"evolver.{name}") for name in ("energies", "minimize", "necks", "problem")),
     ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"),
 }  # fmt: skip

@@ -22,6 +22,8 @@ from .problem import CapillaryProblem
 
 __all__ = ["Evolution", "Frame", "evolve", "write_frames"]
 
+Backend = Callable[..., Minimum]
+
 # Steps of the flow between two remeshings.
 _FLOW_STEPS = 4
 
@@ -100,6 +102,7 @@ def evolve(
     cut_necks: bool = True,
     volume: Literal["shared", "per_component"] = "shared",
     tol: float = 1e-8,
+    backend: Backend = minimize,
     frames: bool = False,
     callback: Callable[[Frame], object] | None = None,
 ) -> Evolution:
@@ -126,6 +129,8 @@ def evolve(
         After a cut, whether pieces share their volume (and pressure), or keep what they have.
     tol : float
         Residual for Newton's method at the end.
+    backend : callable
+        What minimises on given triangles: `minimize`, or an `EvolverBackend`.
     frames : bool
         Keep the surface after every sweep.
     callback : callable, optional
@@ -146,7 +151,7 @@ def evolve(
     most = positive_count(sweeps, "sweeps")
     if volume not in ("shared", "per_component"):
         raise OptionError(f"volume must be one of shared, per_component; got {volume!r}")
-    run = _Run(problem, cut_necks, volume == "per_component", frames, callback)
+    run = _Run(problem, backend, cut_necks, volume == "per_component", frames, callback)
     reshape = (split, collapse) if remeshing else None
     for L in steps:
         run.settle(L, most, reshape)
@@ -163,6 +168,7 @@ class _Run:
     def __init__(
         self,
         problem: CapillaryProblem,
+        backend: Backend,
         cuts: bool,
         apart: bool,
         keep: bool,
@@ -170,6 +176,7 @@ class _Run:
     ) -> None:
         self.now = problem.taken_apart() if apart else problem
         self.cuts, self.apart, self.keep, self.callback = cuts, apart, keep, callback
+        self.backend = backend
         self.minimum = minimize(self.now, "flow", steps=1)
         self.n_cuts = 0
         self.is_cancelled = False
@@ -192,7 +199,7 @@ class _Run:
         """Run Newton's method; tells whether the triangles are still good."""
         if self.is_cancelled or not len(self.now.F):
             return True
-        self.minimum = minimize(self.now, "newton", tol=tol, callback=_is_fit)
+        self.minimum = self.backend(self.now, "newton", tol=tol, callback=_is_fit)
         self.now = self.minimum.problem
         self.note(L, "newton")
         return self.minimum.stop != "cancelled" or self.minimum.converged
@@ -230,7 +237,7 @@ class _Run:
 
     def sweep(self, L: float) -> bool:
         """Let the surface flow, and cut its necks; tells whether it has settled."""
-        self.minimum = minimize(self.now, "flow", steps=_FLOW_STEPS, callback=_is_fit)
+        self.minimum = self.backend(self.now, "flow", steps=_FLOW_STEPS, callback=_is_fit)
         self.now = self.minimum.problem
         event = self._cut(L) if self.cuts else "sweep"
         self.note(L, event)
@@ -318,7 +325,7 @@ def _graded(problem: CapillaryProblem, L: float) -> float | FloatArray:
     if not len(edges):
         return L
     size = np.linalg.norm(problem.V[edges[:, 0]] - problem.V[edges[:, 1]], axis=1)
-    lengths = np.full(len(problem.V), L)
+    lengths = np.full(len(problem.V), float(L))
     lengths[edges.ravel()] = 0.0
     np.maximum.at(lengths, edges.ravel(), np.repeat(size, 2))
     return np.minimum(lengths, L) if (size <= 1.2 * L).all() else lengths

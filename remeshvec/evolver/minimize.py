@@ -21,7 +21,7 @@ from ..errors import OptionError
 from ..solver import LaplacianSolver
 from .problem import CapillaryProblem, Forces
 
-__all__ = ["Minimum", "minimize", "restore_volumes"]
+__all__ = ["Minimum", "measured", "minimize", "restore_volumes"]
 
 # Halvings of a step before it counts as impossible.
 _HALVINGS = 12
@@ -151,6 +151,12 @@ def minimize(
     else:
         stop = "converged" if residual <= tolerance else stop
     return _minimum(now, pressure, residual, tolerance, stop, history)
+
+
+def measured(problem: CapillaryProblem, tolerance: float, stop: str) -> Minimum:
+    """Describe where a surface is."""
+    pressure, residual = _balance(problem, problem.forces())
+    return _minimum(problem, pressure, residual, tolerance, stop, [])
 
 
 def _minimum(

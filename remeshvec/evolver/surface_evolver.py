@@ -1,0 +1,267 @@
+"""Surface Evolver [Brakke 1992] as a backend: datafiles, dumps, and runs of the real program.
+
+Written for version 2.70. The program is a subprocess with a scratch directory for a home, a script for
+its commands, and a time limit.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._check import positive_number
+from .._types import FloatArray
+from ..errors import MeshFormatError, OptionError
+from .errors import EvolverError
+from .minimize import Minimum, measured, restore_volumes
+from .problem import CapillaryProblem
+
+__all__ = ["EvolverBackend", "read_dump", "write_fe"]
+
+IntArray = NDArray[np.int64]
+
+# Gradient steps before Newton steps are tried, and those that count as a step of the flow.
+_WARM_UP, _GRADIENT_STEPS = 5, 20
+
+_SECTION = re.compile(r"^(vertices|edges|faces|facets|bodies|read)\b", re.IGNORECASE | re.MULTILINE)
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+
+
+# --- files ---------------------------------------------------------------------------------------
+
+
+def write_fe(path: str | Path, problem: CapillaryProblem) -> Path:
+    """Write a problem as a datafile of Surface Evolver.
+
+    Fixed vertices and wires are marked so. A body holds the faces, with the prescribed volume, the offset
+    as its ``volconst``, and its density. The gravity constant is always written, since 1 is the default;
+    surfaces that are not closed have ``symmetric_content``, so that the volume means the same.
+
+    Raises
+    ------
+    OptionError
+        Gravity along another axis than -z: Surface Evolver has no other.
+    """
+    if problem.density and np.any(problem.gravity[:2]):
+        raise OptionError("Surface Evolver knows gravity along z only; turn the problem")
+    edges, of_face = _edges(problem.F)
+    wires = {tuple(edge) for edge in np.sort(problem.fixed_edges, axis=1).tolist()}
+    gravity = -float(problem.gravity[2]) if problem.density else 0.0
+    lines = ["symmetric_content", f"gravity_constant {gravity!r}", "", "vertices"]
+    for k, (point, held) in enumerate(zip(problem.V.tolist(), problem.fixed.tolist(), strict=True)):
+        lines.append(f"{k + 1} {point[0]!r} {point[1]!r} {point[2]!r}{' fixed' * held}")
+    lines += ["", "edges"]
+    for k, (a, b) in enumerate(edges.tolist()):
+        lines.append(f"{k + 1} {a + 1} {b + 1}{' fixed' * ((a, b) in wires)}")
+    lines += ["", "faces"]
+    for k, (a, b, c) in enumerate(of_face.tolist()):
+        lines.append(f"{k + 1} {a} {b} {c} tension {problem.tension!r}")
+    lines += ["", *_bodies(problem), "read", ""]
+    file = Path(path)
+    file.write_text("\n".join(lines), encoding="ascii")
+    return file
+
+
+def _bodies(problem: CapillaryProblem) -> list[str]:
+    if not len(problem.targets) and not problem.density:
+        return []
+    lines = ["bodies"]
+    for g in range(max(1, len(problem.targets))):
+        faces = " ".join(str(f + 1) for f in np.flatnonzero(problem.body == g))
+        # The offset belongs to the only body; of several none is known to have it.
+        offset = problem.volume_offset if len(problem.targets) < 2 else 0.0
+        volume = f" volume {float(problem.targets[g]) + offset!r}" if len(problem.targets) else ""
+        density = f" density {problem.density!r}" if problem.density else ""
+        lines.append(f"{g + 1} {faces}{volume} volconst {offset!r}{density}")
+    return [*lines, ""]
+
+
+def _edges(F: IntArray) -> tuple[IntArray, IntArray]:
+    """Edges (k, 2), and of every face the numbers of its three, from 1, negative where it runs back."""
+    half = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
+    edges, number = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
+    sign = np.where(half[:, 0] < half[:, 1], 1, -1)
+    return edges, ((number.ravel() + 1) * sign).reshape(-1, 3)
+
+
+def read_dump(path: str | Path) -> tuple[FloatArray, IntArray, NDArray[np.bool_]]:
+    """Read vertices, faces and fixed vertices from a dump, or from a datafile of plain triangles.
+
+    Returns
+    -------
+    V : (n, 3) float64
+        In the order of their numbers.
+    F : (m, 3) int64
+    fixed : (n,) bool
+
+    Raises
+    ------
+    MeshFormatError
+        A section is missing, or faces that are no triangles.
+    """
+    text = _COMMENT.sub(" ", Path(path).read_text(encoding="latin-1")).replace("\\\n", " ")
+    parts = _SECTION.split(text)
+    sections = {
+        name.lower().replace("facets", "faces"): body
+        for name, body in zip(parts[1::2], parts[2::2], strict=True)
+    }
+    try:
+        vertices = _records(sections["vertices"])
+        edges = {k: (int(row[0]), int(row[1])) for k, row in _records(sections["edges"]).items()}
+        faces = _records(sections["faces"])
+        number = {k: i for i, k in enumerate(sorted(vertices))}
+        V = np.array([[float(x) for x in vertices[k][:3]] for k in sorted(vertices)])
+        F = []
+        for k in sorted(faces):
+            start = []
+            for word in faces[k][:3]:
+                e = int(word)
+                start.append(number[edges[abs(e)][0 if e > 0 else 1]])
+            F.append(start)
+            if len(set(start)) < 3 or _is_number(faces[k][3:4]):
+                raise MeshFormatError(f"{path}: face {k} is no triangle")
+    except (KeyError, IndexError, ValueError) as error:
+        if isinstance(error, MeshFormatError):
+            raise
+        raise MeshFormatError(f"{path}: no datafile of Surface Evolver ({error!r})") from error
+    fixed = np.array(["fixed" in vertices[k] for k in sorted(vertices)])
+    return V, np.array(F, np.int64).reshape(-1, 3), fixed
+
+
+def _records(section: str) -> dict[int, list[str]]:
+    """Words of every line, by the number in front."""
+    rows = (line.split() for line in section.splitlines())
+    return {int(row[0]): row[1:] for row in rows if row and row[0].isdigit()}
+
+
+def _is_number(words: list[str]) -> bool:
+    return bool(words) and re.fullmatch(r"[-+]?\d+", words[0]) is not None
+
+
+# --- the program ---------------------------------------------------------------------------------
+
+
+class EvolverBackend:
+    """Minimise with Surface Evolver; may be given to `evolve` in place of the native solver.
+
+    Called like `minimize`. "flow" is its gradient descent with an optimising scale (``g``), "newton" its
+    ``hessian`` after some of these and a step of scale 0, which restores volumes. Where the energy rises,
+    or Newton steps fail, gradient steps are taken instead.
+
+    Parameters
+    ----------
+    executable : str
+        Name or path of the program; Debian's package is ``evolver-nox``.
+    timeout : float
+        Seconds that a run may take.
+
+    Raises
+    ------
+    EvolverError
+        The program is not there.
+    """
+
+    def __init__(self, executable: str = "evolver", timeout: float = 120.0) -> None:
+        found = shutil.which(executable)
+        if found is None:
+            raise EvolverError(
+                f"{executable} is not installed: apt install evolver-nox, or name its path"
+            )
+        self.executable = found
+        self.timeout = positive_number(timeout, "timeout", "seconds")
+
+    def __call__(
+        self,
+        problem: CapillaryProblem,
+        method: Literal["flow", "newton"] = "flow",
+        *,
+        tol: float = 1e-6,
+        steps: int | None = None,
+        callback: Callable[..., object] | None = None,
+    ) -> Minimum:
+        """Minimise; see `minimize`. ``callback`` is called once, at the end."""
+        tolerance = positive_number(tol, "tol", "no unit")
+        if method not in ("flow", "newton"):
+            raise OptionError(f"method must be one of flow, newton; got {method!r}")
+        count = {"flow": 10, "newton": 8}[method] if steps is None else steps
+        before = problem.with_mesh(restore_volumes(problem)).energy()
+        scripts = [f"g {_GRADIENT_STEPS * count};"]
+        if method == "newton":
+            # A step of scale 0 restores the volumes, which `hessian` expects.
+            newton = "m 0; g;" + " hessian;" * count
+            scripts = [newton, f"g {_WARM_UP}; {newton}", f"g {10 * _GRADIENT_STEPS};"]
+        moved = problem
+        for script in scripts:
+            last = script is scripts[-1]
+            try:
+                moved = problem.with_mesh(self.run(problem, script))
+            except EvolverError:
+                if last:
+                    raise
+                continue
+            if last or moved.energy() <= before + 1e-9 * abs(before):
+                break
+        result = measured(moved, tolerance, "all steps done")
+        if callback is not None:
+            callback(1, moved, result.energy, result.residual)
+        return result
+
+    def run(self, problem: CapillaryProblem, script: str) -> FloatArray:
+        """Run commands on a problem; returns the vertices (n, 3).
+
+        The commands must not change the triangles.
+
+        Raises
+        ------
+        EvolverError
+            The program failed, took too long or wrote no dump; with what it printed last.
+        """
+        with tempfile.TemporaryDirectory(prefix="remeshvec-") as folder:
+            dump = self._run_in(Path(folder), problem, script)
+            V, F, _ = read_dump(dump)
+        if len(V) != len(problem.V) or len(F) != len(problem.F):
+            raise EvolverError("the commands changed the triangles")
+        V[problem.fixed] = problem.V[problem.fixed]
+        return V
+
+    def energy(self, problem: CapillaryProblem) -> float:
+        """Return the energy that Surface Evolver computes for a surface as it is, offset included."""
+        with tempfile.TemporaryDirectory(prefix="remeshvec-") as folder:
+            self._run_in(Path(folder), problem, 'printf "%.17g\\n", total_energy >> "energy.txt";')
+            text = (Path(folder) / "energy.txt").read_text(encoding="ascii")
+        return float(text) + problem.energy_offset
+
+    def _run_in(self, folder: Path, problem: CapillaryProblem, script: str) -> Path:
+        write_fe(folder / "data.fe", problem)
+        commands = folder / "commands"
+        commands.write_text(f'{script}\ndump "out.dmp";\nq\nq\n', encoding="ascii")
+        try:
+            done = subprocess.run(
+                [self.executable, "-x", "-f", "commands", "data.fe"],
+                cwd=folder,
+                env={**os.environ, "HOME": str(folder)},
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=self.timeout,
+                check=False,
+            )
+        except subprocess.TimeoutExpired as error:
+            raise EvolverError(f"Surface Evolver took more than {self.timeout:g} s") from error
+        said = "\n".join((done.stdout + done.stderr).splitlines()[-8:])
+        if done.returncode:
+            raise EvolverError(f"Surface Evolver failed (exit {done.returncode}):\n{said}")
+        dump = folder / "out.dmp"
+        if not dump.is_file():
+            raise EvolverError(f"Surface Evolver wrote no dump:\n{said}")
+        return dump
