@@ -30,8 +30,9 @@ _HALVINGS = 12
 _CORRECTIONS = 20
 _VOLUME_ERROR = 1e-12  # relative
 
-# Part of the stiffness matrix, and of the Hessian, that holds components without fixed vertices in place.
-_GAUGE = 1e-4
+# Added to the diagonal of the stiffness matrix, relative to it: holds components without fixed vertices
+# in place, also those that shrink to nothing.
+_GAUGE = 1e-6
 
 # Half cotangent of angles of 1.1 degrees: the metric of faces with smaller ones is noise.
 _SLIVER = 25.0
@@ -252,8 +253,8 @@ def _searched(
 
 def _flow_step(problem: CapillaryProblem, forces: Forces, _: FloatArray) -> FloatArray | None:
     """Step along the gradient in the metric of the surface's own stiffness matrix."""
-    area = np.maximum(_normals(problem)[1], np.finfo(float).tiny)
-    K = _stiffness(problem) + _GAUGE * sp.diags_array(area) * (1.0 / area.sum())
+    K = _stiffness(problem)
+    K = K + _GAUGE * sp.diags_array(K.diagonal())
     solver = LaplacianSolver(problem.tension * K, problem.fixed)
     sides = [forces.energy, *forces.volume]
     solved = np.split(solver.solve(np.concatenate(sides, axis=1)), len(sides), axis=1)
