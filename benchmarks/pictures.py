@@ -18,6 +18,7 @@ import numpy as np
 
 from remeshvec import Adaptive, remesh
 
+from .films import catenoid, cube, rings, splitting
 from .meshes import load
 from .panels import (
     FloatArray,
@@ -211,6 +212,10 @@ PICTURES: dict[str, Callable[[], Picture]] = {
         twist,
         bend,
         smoothing,
+        cube,
+        catenoid,
+        rings,
+        splitting,
     )
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -34,8 +35,9 @@ _SLIVER = 0.2
 # unless forces grow, as they do for long where a surface is about to break.
 _SETTLED, _PATIENCE = 1e-5, 3
 
-# Times that Newton's method may lead so far away that the surface has to be remeshed.
-_RETURNS = 3
+# Steps of Newton's method at the end, and times that they may lead so far away that the surface has to be
+# remeshed.
+_NEWTON_STEPS, _RETURNS = 15, 6
 
 # A component without wires and with less volume than this many cubed edge lengths is dropped.
 _CRUMB = 0.5
@@ -122,7 +124,7 @@ def evolve(
     split, collapse : float
         Edges longer and shorter than these times the length are split and collapsed.
     remeshing : bool
-        Without it the triangles stay as they are, whatever happens to them.
+        Without it the triangles stay as they are, whatever happens to them, and no neck is cut.
     cut_necks : bool
         Cut necks that have thinned to three edges.
     volume : {"shared", "per_component"}
@@ -151,7 +153,9 @@ def evolve(
     most = positive_count(sweeps, "sweeps")
     if volume not in ("shared", "per_component"):
         raise OptionError(f"volume must be one of shared, per_component; got {volume!r}")
-    run = _Run(problem, backend, cut_necks, volume == "per_component", frames, callback)
+    run = _Run(
+        problem, backend, cut_necks and remeshing, volume == "per_component", frames, callback
+    )
     reshape = (split, collapse) if remeshing else None
     for L in steps:
         run.settle(L, most, reshape)
@@ -181,6 +185,7 @@ class _Run:
         self.n_cuts = 0
         self.is_cancelled = False
         self.best, self.idle = float("inf"), 0  # energy, sweeps since
+        self.check: Callable[..., bool] | None = None  # of the triangles, after every step
         self.frames: list[Frame] = []
         self.history: list[dict[str, float]] = []
 
@@ -196,13 +201,20 @@ class _Run:
                 return
 
     def finish(self, L: float, tol: float) -> bool:
-        """Run Newton's method; tells whether the triangles are still good."""
+        """Run Newton's method; tells whether it found a minimum, or nothing better, near by.
+
+        From a saddle, where the flow settles as well, it leads away.
+        """
         if self.is_cancelled or not len(self.now.F):
             return True
-        self.minimum = self.backend(self.now, "newton", tol=tol, callback=_is_fit)
+        before = self.now.energy()
+        self.minimum = self.backend(
+            self.now, "newton", tol=tol, steps=_NEWTON_STEPS, callback=self.check
+        )
         self.now = self.minimum.problem
         self.note(L, "newton")
-        return self.minimum.stop != "cancelled" or self.minimum.converged
+        is_lower = self.now.energy() < before - _SETTLED * abs(before)
+        return self.minimum.converged or not is_lower
 
     def remesh(self, L: float, split: float, collapse: float) -> None:
         """Remesh all but the wires, and restore the volumes before anything else."""
@@ -237,7 +249,7 @@ class _Run:
 
     def sweep(self, L: float) -> bool:
         """Let the surface flow, and cut its necks; tells whether it has settled."""
-        self.minimum = self.backend(self.now, "flow", steps=_FLOW_STEPS, callback=_is_fit)
+        self.minimum = self.backend(self.now, "flow", steps=_FLOW_STEPS, callback=self.check)
         self.now = self.minimum.problem
         event = self._cut(L) if self.cuts else "sweep"
         self.note(L, event)
@@ -246,8 +258,11 @@ class _Run:
             self.best, self.idle = energy, 0
         else:
             self.idle += 1
-        residuals = [one["residual"] for one in self.history[-1 - _PATIENCE :]]
-        is_growing = self.minimum.residual > 1.02 * residuals[0]
+        last = self.history[-1 - _PATIENCE :]
+        # About to break: forces grow, and the energy falls all the time, if only a little.
+        is_growing = last[-1]["residual"] > 1.02 * last[0]["residual"] and all(
+            two["energy"] < one["energy"] for one, two in pairwise(last)
+        )
         return self.is_cancelled or (self.idle >= _PATIENCE and not is_growing)
 
     def _cut(self, L: float) -> str:

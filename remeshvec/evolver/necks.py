@@ -68,7 +68,7 @@ def _next_cycle(
 ) -> Cycle | None:
     """Return the shortest cycle that is a neck."""
     sizes = []
-    for cycle in _cycles(F, held, len(V)):
+    for cycle in _cycles(F, held, len(V), 4 if perimeter > 0.0 else 3):
         P = V[list(cycle)]
         size = float(np.linalg.norm(P - np.roll(P, 1, axis=0), axis=1).sum())
         if len(cycle) == 3 or size <= perimeter:
@@ -76,35 +76,34 @@ def _next_cycle(
     return next((cycle for _, cycle in sorted(sizes) if _is_neck(V, F, cycle)), None)
 
 
-def _cycles(F: IntArray, held: NDArray[np.bool_], n: int) -> list[Cycle]:
+def _cycles(F: IntArray, held: NDArray[np.bool_], n: int, longest: int) -> list[Cycle]:
     """Cycles of three edges that are no face, and of four without a diagonal."""
     edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
     edges = np.unique(edges[~held[edges].any(axis=1)], axis=0)
     both = np.concatenate([edges, edges[:, ::-1]])
     near = sp.csr_array((np.ones(len(both), np.int64), (both[:, 0], both[:, 1])), (n, n))
-    near.sort_indices()
     # Ends of edges have as many common neighbours as the edge has faces, but for what is looked for.
-    paths = (near @ near).tocoo()
-    ahead = paths.row < paths.col
-    row, column, count = paths.row[ahead], paths.col[ahead], paths.data[ahead]
-    is_edge = np.asarray(near[row, column]).ravel() > 0
-    faces = {tuple(face) for face in np.sort(F, axis=1).tolist()}
-    cycles: list[Cycle] = []
-    for a, c in zip(
-        row[is_edge & (count > 2)].tolist(), column[is_edge & (count > 2)].tolist(), strict=True
-    ):
-        cycles += [(a, b, c) for b in _common(near, a, c) if tuple(sorted((a, b, c))) not in faces]
-    others = ~is_edge & (count > 1)
-    for a, c in zip(row[others].tolist(), column[others].tolist(), strict=True):
-        between = _common(near, a, c)
-        cycles += [(a, b, c, d) for b in between for d in between if b < d and near[b, d] == 0]
-    return list({tuple(sorted(cycle)): cycle for cycle in cycles}.values())
-
-
-def _common(near: sp.csr_array, a: int, b: int) -> list[int]:
-    """Neighbours that two vertices share."""
-    one, two = (near.indices[near.indptr[v] : near.indptr[v + 1]] for v in (a, b))
-    return [int(v) for v in np.intersect1d(one, two)]
+    paths = sp.triu(near @ near, 1).tocoo()
+    is_edge = np.isin(paths.row * n + paths.col, edges[:, 0] * n + edges[:, 1])
+    closed = is_edge & (paths.data > 2)
+    crossed = ~is_edge & (paths.data > 1) & (longest > 3)
+    around: dict[int, set[int]] = {}
+    for a, b in both.tolist():
+        around.setdefault(a, set()).add(b)
+    faces = {tuple(face) for face in np.sort(F, axis=1).tolist()} if closed.any() else set()
+    cycles: dict[Cycle, Cycle] = {}
+    for a, c in zip(paths.row[closed].tolist(), paths.col[closed].tolist(), strict=True):
+        for b in around[a] & around[c]:
+            key = tuple(sorted((a, b, c)))
+            if key not in faces:
+                cycles[key] = key
+    for a, c in zip(paths.row[crossed].tolist(), paths.col[crossed].tolist(), strict=True):
+        between = around[a] & around[c]
+        for b in between:
+            for d in between - around[b]:
+                if b < d:
+                    cycles[tuple(sorted((a, b, c, d)))] = (a, b, c, d)
+    return list(cycles.values())
 
 
 def _is_neck(V: FloatArray, F: IntArray, cycle: Cycle) -> bool:

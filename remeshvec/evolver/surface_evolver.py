@@ -225,13 +225,24 @@ class EvolverBackend:
         EvolverError
             The program failed, took too long or wrote no dump; with what it printed last.
         """
-        with tempfile.TemporaryDirectory(prefix="remeshvec-") as folder:
-            dump = self._run_in(Path(folder), problem, script)
-            V, F, _ = read_dump(dump)
+        V, F, _ = self.run_freely(problem, script)
         if len(V) != len(problem.V) or len(F) != len(problem.F):
             raise EvolverError("the commands changed the triangles")
         V[problem.fixed] = problem.V[problem.fixed]
         return V
+
+    def run_freely(
+        self, problem: CapillaryProblem, script: str
+    ) -> tuple[FloatArray, IntArray, NDArray[np.bool_]]:
+        """Run commands that may refine or remove triangles; returns what `read_dump` does.
+
+        Raises
+        ------
+        EvolverError
+            As `run`.
+        """
+        with tempfile.TemporaryDirectory(prefix="remeshvec-") as folder:
+            return read_dump(self._run_in(Path(folder), problem, script))
 
     def energy(self, problem: CapillaryProblem) -> float:
         """Return the energy that Surface Evolver computes for a surface as it is, offset included."""
