@@ -20,7 +20,7 @@ def test_links_lead_somewhere(page):
     assert not missing
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/modelling.md"])
+@pytest.mark.parametrize("name", ["README.md", "docs/modelling.md", "docs/capillary.md"])
 def test_code_runs(name, monkeypatch, tmp_path, capsys):
     """From the root of a checkout, but files are written elsewhere."""
     (tmp_path / "data").symlink_to(ROOT / "data")
@@ -32,7 +32,10 @@ def test_code_runs(name, monkeypatch, tmp_path, capsys):
         warnings.simplefilter("error")
         for block in blocks:
             exec(compile(block, name, "exec"), names)
-    if name.startswith("docs"):
+    if name.endswith("capillary.md"):
+        assert names["film"].history[-1]["components"] == 2
+        assert names["found"].converged
+    if name.endswith("modelling.md"):
         assert {"solver", "surface", "W", "moved"} <= set(names)
         assert names["surface"].V.shape[1] == 3
         assert names["heat"].max() == 1.0 and names["heat"].min() == 0.0
