@@ -199,7 +199,7 @@ def test_pinned_drops_follow_young_and_laplace():
     t = 2 * np.pi * np.arange(n) / n
     V = np.vstack([np.column_stack([np.cos(t), np.sin(t), 0 * t]), [[0, 0, 1.2]]])
     F = np.column_stack([np.arange(n), (np.arange(n) + 1) % n, np.full(n, n)])
-    for bond in (0.0, 2.0):
+    for bond in (0.0, 2.0, 5.0):
         problem = CapillaryProblem(V, F, volume=volume, density=bond, gravity=(0, 0, -1))
         done = evolve(problem, [0.25, 0.12, 0.08])
         assert done.minimum.converged and len(done.minimum.F) < 2300
