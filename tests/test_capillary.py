@@ -248,6 +248,11 @@ def test_bad_input():
             CapillaryProblem(V, F, **options)
     with pytest.raises(MeshInputError):
         CapillaryProblem(V, F + 1)
+    turned = F.copy()
+    turned[3] = turned[3, ::-1]
+    with pytest.raises(MeshInputError, match="the same way"):
+        CapillaryProblem(V, turned, volume=1.0)
+    assert CapillaryProblem(V, turned).area() == pytest.approx(CapillaryProblem(V, F).area())
     problem = CapillaryProblem(V, F, volume=1.0)
     for options in ({"method": "lbfgs"}, {"tol": 0}, {"steps": 0}):
         with pytest.raises(OptionError):

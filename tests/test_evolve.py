@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import igl
+import nonmanifold
 import numpy as np
 import pytest
 import zoo
@@ -253,6 +254,20 @@ def test_crumbs_are_dropped_and_pieces_keep_their_volume():
     done = evolve(CapillaryProblem(V, F, volume=total), [0.25], volume="per_component")
     assert done.history[-1]["components"] == 1
     assert done.minimum.volume == pytest.approx(total, rel=1e-9)
+
+
+@pytest.mark.parametrize("volume", [None, 0.0])
+def test_what_encloses_nothing_vanishes(volume):
+    done = evolve(CapillaryProblem(*zoo.icosphere(2), volume=volume), [0.3])
+    assert len(done.minimum.F) == 0 and done.minimum.stop == "nothing is left"
+    assert done.minimum.energy == 0 and done.history[-1]["components"] == 0
+
+
+def test_films_that_meet_are_films():
+    """Three half-discs on one wire each: junctions are kept, and nothing is cut."""
+    V, F = nonmanifold.half_discs()
+    done = evolve(CapillaryProblem(V, F), [0.2])
+    assert done.minimum.converged and done.n_cuts == 0
 
 
 def test_frames_are_written(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -193,7 +193,7 @@ class _Run:
         """Sweep until little changes."""
         self.best, self.idle = float("inf"), 0
         for _ in range(most):
-            if self.is_cancelled:
+            if self.is_cancelled or not len(self.now.F):
                 return
             if reshape is not None:
                 self.remesh(L, *reshape)
@@ -274,6 +274,12 @@ class _Run:
             self.now = now.with_mesh(found.V, F=found.F, fixed=now.fixed[found.source], body=body)
             self.n_cuts += found.n_cuts
         dropped = self._drop_crumbs(L)
+        if not len(self.now.F):
+            self.minimum = replace(
+                self.minimum, problem=self.now, energy=self.now.energy(), area=0.0,
+                volume=self.now.total_volume(), stop="nothing is left",
+            )  # fmt: skip
+            return "dropped"
         if (found.n_cuts or dropped) and self.apart:
             self.now = self.now.taken_apart()
         if found.n_cuts or dropped:

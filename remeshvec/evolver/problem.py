@@ -11,9 +11,9 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
 
-from .._check import as_array, as_indices, as_mask, as_mesh, positive_number
+from .._check import as_array, as_indices, as_mask, as_mesh, positive_number, which
 from .._types import FloatArray
-from ..errors import OptionError
+from ..errors import MeshInputError, OptionError
 from .energies import areas, gradients, hessian, potentials, volumes
 
 __all__ = ["CapillaryProblem", "Forces"]
@@ -74,7 +74,8 @@ class CapillaryProblem:
     Raises
     ------
     MeshInputError
-        V and F are no mesh.
+        V and F are no mesh; or they enclose nothing in particular, because two faces run an edge the
+        same way, where a volume or a density is given.
     OptionError
         Indices out of range, numbers that are not positive or finite.
     """
@@ -112,6 +113,8 @@ class CapillaryProblem:
             raise OptionError(f"gravity must have 3 components; got {self.gravity.shape}")
         if bodies not in ("shared", "per_component"):
             raise OptionError(f"bodies must be one of shared, per_component; got {bodies!r}")
+        if self.volume is not None or self.density:
+            _check_winding(faces)
         self.body = np.zeros(len(faces), np.int64)  # of every face
         # Volume of every body without the offset.
         self.targets = np.empty(0)
@@ -209,6 +212,19 @@ def boundary_edges(F: IntArray) -> IntArray:
     edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     return np.asarray(edges[count == 1])
+
+
+def _check_winding(F: IntArray) -> None:
+    """Refuse faces that run an edge the same way: there is no inside then."""
+    half = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    key = half[:, 0] * (F.max() + 1) + half[:, 1]
+    _, index, count = np.unique(key, return_index=True, return_counts=True)
+    bad = np.unique(index[count > 1] % len(F))
+    if len(bad):
+        raise MeshInputError(
+            f"{which(bad, 'face')} of F run an edge the same way as another, so that no volume is "
+            "enclosed; remesh turns them where the surface is a manifold"
+        )
 
 
 def _at_vertices(F: IntArray, corners: FloatArray, n: int) -> FloatArray:
