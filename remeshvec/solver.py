@@ -42,9 +42,9 @@ class LaplacianSolver:
     method : {"auto", "cholesky", "cholmod", "lu"}
         Which factorisation. "cholesky" is Eigen's simplicial one, from libigl: the fastest to factor.
         "cholmod" is SuiteSparse's, from the package cholespy (``pip install 'remeshvec[cholmod]'``): it
-        takes twice as long to factor and 0.4 of the time to solve, so it pays from about 15 solves on. "lu" is
-        SuperLU, from SciPy. "auto" is "cholesky" where the part of A between free vertices is symmetric
-        with diagonal entries of one sign, else "lu".
+        takes twice as long to factor and 0.4 of the time to solve, so it pays from about 15 solves on.
+        "lu" is SuperLU, from SciPy. "auto" is "cholesky" where the part of A between free vertices is
+        symmetric with diagonal entries of one sign, else "lu".
 
     Attributes
     ----------
