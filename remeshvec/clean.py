@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ._types import FloatArray
 
 __all__ = [
+    "count_edges",
     "count_used",
     "drop_degenerate_faces",
     "drop_duplicate_faces",
@@ -22,6 +23,12 @@ Indices = NDArray[np.intp]
 
 # Of y and z in the sums that tell points apart.
 _WEIGHTS = 0.7320508075688772, 0.23606797749978969
+
+
+def count_edges(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
+    """Return the edges (k, 2), smaller end first, in order, and how many faces have each."""
+    edges = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
+    return np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
 
 
 def count_used(F: Faces, n: int) -> int:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._check import as_mask, as_mesh, positive_count, positive_number
 from ._types import FloatArray
+from .clean import count_edges
 from .errors import MeshInputError, OptionError
 from .laplacians import Area, cotangent_matrix, vertex_areas
 from .solver import LaplacianSolver
@@ -75,7 +76,8 @@ def smooth(
     if fixed is not None:
         stays |= as_mask(fixed, n, "fixed", "vertex")
     if boundary == "fixed":
-        stays[_boundary_vertices(faces)] = True
+        edges, uses = count_edges(faces)
+        stays[edges[uses == 1]] = True
     parts = _closed_parts(vertices, faces) if keep_volume else []
     if keep_volume and stays[faces].any():
         raise OptionError("keep_volume moves all vertices; it cannot hold some fixed")
@@ -110,13 +112,6 @@ def _flow(
     solved = LaplacianSolver(A, stays).solve(mass[:, None] * x, x[stays])
     solved[stays] = x[stays]
     return solved
-
-
-def _boundary_vertices(F: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Find the ends of edges that one face has."""
-    edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
-    edges, count = np.unique(edges, axis=0, return_counts=True)
-    return np.unique(edges[count == 1])
 
 
 def _closed_parts(V: FloatArray, F: NDArray[np.int64]) -> list[tuple[NDArray[np.intp], float]]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .._check import positive_count, positive_number
 from .._types import FloatArray
+from ..clean import count_edges
 from ..errors import OptionError
 from ..mesh_files import write_mesh
 from ..remesh import remesh
@@ -219,7 +220,6 @@ class _Run:
     def remesh(self, L: float, split: float, collapse: float) -> None:
         """Remesh all but the wires, and restore the volumes before anything else."""
         now = self.now
-        n = len(now.V)
         result = remesh(
             now.V,
             now.F,
@@ -237,7 +237,6 @@ class _Run:
         fixed = np.zeros(len(result.V), np.bool_)
         mapped = result.vertex_map
         fixed[mapped[now.fixed & (mapped >= 0)]] = True
-        assert n == len(mapped)
         self.now = now.with_mesh(
             result.V,
             F=result.F,
@@ -356,9 +355,7 @@ def _inner_wires(problem: CapillaryProblem) -> NDArray[np.int64] | None:
     """Wires with faces on both sides."""
     if not len(problem.fixed_edges):
         return None
-    F = problem.F
-    edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
+    unique, count = count_edges(problem.F)
     n = len(problem.V)
     inner = unique[count > 1]
     wires = np.sort(problem.fixed_edges, axis=1)

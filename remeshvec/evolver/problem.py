@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from .._check import as_array, as_indices, as_mask, as_mesh, positive_number, which
 from .._types import FloatArray
+from ..clean import count_edges
 from ..errors import MeshInputError, OptionError
 from .energies import areas, gradients, hessian, potentials, volumes
 
@@ -97,7 +98,11 @@ class CapillaryProblem:
     ) -> None:
         vertices, faces = as_mesh(V, F)
         n = len(vertices)
-        edges = boundary_edges(faces) if fixed_edges is None else _edges(fixed_edges, n)
+        if fixed_edges is None:
+            edges, uses = count_edges(faces)
+            edges = edges[uses == 1]
+        else:
+            edges = _edges(fixed_edges, n)
         mask = np.zeros(n, np.bool_) if fixed is None else as_mask(fixed, n, "fixed", "vertex")
         mask[edges] = True
         mask |= np.bincount(faces.ravel(), minlength=n) == 0
@@ -205,13 +210,6 @@ class CapillaryProblem:
 
     def _corners(self, V: FloatArray | None) -> FloatArray:
         return (self.V if V is None else V)[self.F]
-
-
-def boundary_edges(F: IntArray) -> IntArray:
-    """Return the edges (k, 2) that one face has."""
-    edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
-    edges, count = np.unique(edges, axis=0, return_counts=True)
-    return np.asarray(edges[count == 1])
 
 
 def _check_winding(F: IntArray) -> None:
