@@ -94,6 +94,17 @@ def test_small_tips_are_no_necks():
     assert cut_necks(V, F, np.zeros(len(V), bool)).n_cuts == 0
 
 
+def test_flat_patches_are_no_necks():
+    """Nine faces inside of a triangle: many, but no more area than a cap would have."""
+    V, F = zoo.icosphere(2)
+    for f in (7, -1, -3, -5):
+        V = np.vstack([V, V[F[f]].mean(axis=0)])
+        k = len(V) - 1
+        a, b, c = F[f]
+        F = np.vstack([np.delete(F, f, axis=0), [[a, b, k], [b, c, k], [c, a, k]]])
+    assert cut_necks(V, F, np.zeros(len(V), bool)).n_cuts == 0
+
+
 def test_handles_are_cut_too():
     """A neck that separates nothing: the torus becomes a ball."""
     V, F = zoo.torus(24, 3)
