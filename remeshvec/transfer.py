@@ -80,9 +80,7 @@ def pick(values: Any, index: IntArray) -> Any:
     return taken
 
 
-def _weighted_sum(
-    values: NDArray[Any], index: IntArray, weights: FloatArray
-) -> NDArray[Any]:
+def _weighted_sum(values: NDArray[Any], index: IntArray, weights: FloatArray) -> NDArray[Any]:
     """Add up in double precision, and return to the type of the values."""
     columns = (slice(None), *(None,) * (values.ndim - 1))
     total: NDArray[Any] = np.zeros((len(index), *values.shape[1:]), np.result_type(values, float))

@@ -28,7 +28,7 @@ LEVELS = {
     ],
     5: [
         "options", "constraints", "prepare", "lengths", "reference", "seams", "deviation",
-        "report", "sweeps", "provenance", "extract", "transfer", "result", "job", "remesh",
+        "report", "sweeps", "sides", "provenance", "extract", "transfer", "result", "job", "remesh",
     ],
     6: [
         "laplacians", "solver", "motion", "fairing", "editing", "multiresolution", "smoothing",
@@ -60,9 +60,9 @@ SIDEWAYS = {
     *(("sweeps", name) for name in (
         "options", "lengths", "reference", "seams", "deviation", "report",
     )),
-    ("provenance", "report"), ("result", "report"), ("result", "transfer"),
+    ("sides", "report"), ("provenance", "sides"), ("result", "report"), ("result", "transfer"),
     *(("extract", name) for name in (
-        "constraints", "prepare", "provenance", "reference", "report", "seams",
+        "constraints", "prepare", "reference", "report", "seams", "sides",
     )),
     *(("job", name) for name in ("constraints", "prepare", "lengths", "reference", "sweeps")),
     *(("remesh", name) for name in (
