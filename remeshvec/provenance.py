@@ -1,4 +1,4 @@
-"""Where vertices, faces and corners lie on the input, and where the input's vertices lie on the result."""
+"""Where vertices, faces and corners lie on the input, and the input's vertices on the result."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ sides, and no width.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ __all__ = ["Births", "Provenance", "locate_corners"]
 IntArray = NDArray[np.int64]
 
 # Faces or half-edges, and weights of the three corners of their faces.
-Births = tuple[NDArray[np.integer], FloatArray]
+Births = tuple[NDArray[Any], FloatArray]
 
 # How candidates for the side of a corner compare: whatever lies in another patch is wrong, an edge of
 # the same curve is right, one with the same ends even more so; then the direction decides.
@@ -47,7 +47,7 @@ class Provenance(NamedTuple):
     reference: Reference
     features: IndexArray  # (k,) half-edges of the reference on curves
     names: IndexArray  # (k,) of those curves' edges
-    face_source: NDArray[np.integer]  # faces of the reference in the input
+    face_source: NDArray[Any]  # faces of the reference in the input
     vertex_source: IndexArray  # vertices of the reference in the input
     flipped: NDArray[np.bool_] | None  # faces of the input whose corners 1 and 2 were swapped
     same: IndexArray | None  # the vertex that stands for each of the input; None: itself
@@ -69,7 +69,7 @@ def locate_corners(p: Provenance) -> Births:
         edge = _edges_beside(p, h, birth)
         sector = _sectors(mesh, h)
         at_vertex = _keep_sides(p, sector, edge // 3, birth // 3, weights)
-        face, where = (array[v] for array in at_vertex)
+        face, where = at_vertex[0][v], at_vertex[1][v]
         place = np.zeros((len(h), 3))
         along = _shares_along(p, mesh.origin[h], edge, birth, weights)
         place[np.arange(len(h)), edge % 3] = 1.0 - along
@@ -80,7 +80,7 @@ def locate_corners(p: Provenance) -> Births:
 
 
 def _edges_beside(p: Provenance, h: IntArray, birth: IndexArray) -> IntArray:
-    """Half-edges of the reference at the origins of half-edges on curves, with the same side on the left."""
+    """Half-edges of the reference at the origins of others on curves, with the same side on the left."""
     mesh, reference = p.mesh, p.reference
     patch = reference.tree.patch
     v, w = ends_of(mesh.origin, h)
@@ -118,7 +118,8 @@ def _candidates(
     by_name = np.argsort(p.names, kind="stable")
     sliding = np.flatnonzero(~is_fixed)
     row, place = _matches(p.names[by_name], birth[sliding])
-    pairs = [(sliding[row], p.features[by_name[place]])]
+    edges: NDArray[Any] = p.features[by_name[place]]
+    pairs = [(sliding[row], edges)]
     fixed = np.flatnonzero(is_fixed)
     at = p.reference.origin[birth[fixed]]
     near = np.zeros(len(p.reference.X), np.bool_)
@@ -127,11 +128,11 @@ def _candidates(
     leaving = leaving[np.argsort(p.reference.origin[leaving], kind="stable")]
     row, place = _matches(p.reference.origin[leaving], at)
     pairs.append((fixed[row], leaving[place]))
-    rows, edges = (np.concatenate(part).astype(np.int64) for part in zip(*pairs, strict=True))
-    return rows, edges
+    row, edges = (np.concatenate(part).astype(np.int64) for part in zip(*pairs, strict=True))
+    return row, edges
 
 
-def _matches(keys: NDArray[np.integer], wanted: NDArray[np.integer]) -> tuple[IntArray, IntArray]:
+def _matches(keys: NDArray[Any], wanted: NDArray[Any]) -> tuple[IntArray, IntArray]:
     """Pairs of a place in ``wanted`` and a place in the ascending ``keys`` that hold the same."""
     start = np.searchsorted(keys, wanted, "left")
     count = np.searchsorted(keys, wanted, "right") - start
@@ -157,7 +158,7 @@ def _curves(p: Provenance) -> IntArray:
 def _shares_along(
     p: Provenance, v: IndexArray, edge: IntArray, birth: IndexArray, weights: FloatArray
 ) -> FloatArray:
-    """How far along half-edges of the reference vertices lie: those that slide do, others at the start."""
+    """How far along half-edges of the reference vertices lie: fixed ones at the start."""
     known = birth[v].astype(np.int64)
     along = weights[v, (known + 1 - 3 * (known % 3 == 2)) % 3]
     origin, X = p.reference.origin, p.reference.X
@@ -194,8 +195,8 @@ def _unit(x: FloatArray) -> FloatArray:
 def _keep_sides(
     p: Provenance,
     sector: IntArray,
-    beside: NDArray[np.integer],
-    face: NDArray[np.integer],
+    beside: NDArray[Any],
+    face: NDArray[Any],
     weights: FloatArray,
 ) -> Births:
     """Where vertices lie, (n,) faces and weights; not across a curve that has one patch on both sides.
@@ -252,7 +253,7 @@ def _vertices_beside(mesh: Mesh, v: IntArray) -> NDArray[np.bool_]:
 
 
 def _ways(
-    p: Provenance, v: IntArray, w: IndexArray, start: IntArray, face: IndexArray
+    p: Provenance, v: IntArray, w: IndexArray, start: NDArray[Any], face: IndexArray
 ) -> tuple[IndexArray, FloatArray]:
     """Lengths of ways from vertices ``w``, on faces ``start``, to the faces of vertices ``v``.
 
