@@ -21,6 +21,7 @@ from .result import RemeshResult
 from .sizing import Adaptive
 
 if TYPE_CHECKING:
+    from .data_files import remesh_file
     from .editing import Editor, deform
     from .fairing import fair
     from .laplacians import cotangent_matrix, laplacian, vertex_areas
@@ -53,6 +54,7 @@ __all__ = [
     "quality",
     "read_mesh",
     "remesh",
+    "remesh_file",
     "smooth",
     "surface_distance",
     "vertex_areas",
@@ -69,6 +71,7 @@ _LATE = {
     "deform": "editing",
     "fair": "fairing",
     "laplacian": "laplacians",
+    "remesh_file": "data_files",
     "smooth": "smoothing",
     "vertex_areas": "laplacians",
 }

@@ -1,9 +1,10 @@
 """The guard for PLY files: which way a file may take, or why it may not.
 
-libigl reads a binary file safely when its faces all have the same number of corners and the bytes
-are all there; on faces of several sizes it aborts the process, of a file that is cut short it
-returns memory that was never written. An ASCII file with the usual columns goes the way of OFF.
-Everything else needs plyfile, which is pure Python and slower by far, but reads it all.
+libigl reads a binary file safely when its faces all have the same number of corners, the bytes are
+all there, and there is nothing else: on faces of several sizes or columns beside the mesh it aborts the
+process, of a file that is cut short it returns memory that was never written. So it gets a copy that
+holds the mesh alone. An ASCII file with the usual columns goes the way of OFF. Everything else needs
+plyfile, which is pure Python and slower by far, but reads it all.
 """
 
 from __future__ import annotations
@@ -95,9 +96,10 @@ def check_ply(data: bytes) -> MeshCopy | None:
         return off_copy(lines, n, m) if _has_body_of_off(header) else None
     least = sum(element.rows * element.least_bytes for element in header.elements)
     check_room(least, len(data) - header.start, "bytes")
-    if not _has_uniform_faces(data, header):
+    tables = _uniform_tables(data, header)
+    if tables is None:
         return None
-    return MeshCopy(data, ".ply", header.element("face").rows)
+    return MeshCopy(_plain_ply(header, *tables), ".ply", header.element("face").rows)
 
 
 def parse_header(data: bytes) -> PlyHeader:
@@ -150,20 +152,39 @@ def _has_body_of_off(header: PlyHeader) -> bool:
     return scalars == ["x", "y", "z"] and face.properties[0].name in INDEX_LISTS
 
 
-def _has_uniform_faces(data: bytes, header: PlyHeader) -> bool:
-    """Whether all bytes are there, in tables of fixed rows, with types that libigl knows."""
-    position = header.start
+def _uniform_tables(data: bytes, header: PlyHeader) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the rows of vertices and faces, if all are there, and of types that libigl knows."""
+    position, tables = header.start, {}
     for element in header.elements:
         row = _row_dtype(data, header.format, element, position)
         if row is None or position + element.rows * row.itemsize > len(data):
-            return False
+            return None
+        table = np.frombuffer(data, row, element.rows, position)
         if row.names and "length" in row.names and element.rows:
-            lengths = np.frombuffer(data, row, element.rows, position)["length"]
+            lengths = table["length"]
             if lengths[0] < 3 or (lengths != lengths[0]).any():
-                return False
+                return None
+        tables[element.name] = table
         position += element.rows * row.itemsize
     points = [p.dtype for p in header.element("vertex").properties if p.name in ("x", "y", "z")]
-    return points in (["f4"] * 3, ["f8"] * 3)
+    is_known = points in (["f4"] * 3, ["f8"] * 3)
+    return (tables["vertex"], tables["face"]) if is_known else None
+
+
+def _plain_ply(header: PlyHeader, vertex: np.ndarray, face: np.ndarray) -> bytes:
+    """Write vertices and corners of faces alone."""
+    columns = [p.name for p in header.element("vertex").properties]
+    points = np.stack([vertex[f"scalar{columns.index(axis)}"] for axis in "xyz"], axis=1)
+    corners = face["corners"].reshape(len(face), -1)
+    rows = np.empty(len(face), [("length", "<u2"), ("corners", "<i4", corners.shape[1:])])
+    rows["length"], rows["corners"] = corners.shape[1], corners
+    kind = "float" if points.dtype.itemsize == 4 else "double"
+    text = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+        + "".join(f"property {kind} {axis}\n" for axis in "xyz")
+        + f"element face {len(face)}\nproperty list ushort int vertex_indices\nend_header\n"
+    )
+    return text.encode() + points.astype(f"<f{points.dtype.itemsize}").tobytes() + rows.tobytes()
 
 
 def _row_dtype(data: bytes, form: str, element: Element, position: int) -> np.dtype | None:

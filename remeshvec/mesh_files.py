@@ -24,7 +24,15 @@ from ._mesh_writers import WRITERS
 from ._ply_guard import check_ply, parse_header
 from .errors import MeshFormatError
 
-__all__ = ["SUFFIXES", "MeshFile", "check_writable", "read_mesh", "write_file", "write_mesh"]
+__all__ = [
+    "SUFFIXES",
+    "MeshFile",
+    "check_writable",
+    "read_mesh",
+    "reason",
+    "write_file",
+    "write_mesh",
+]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -92,7 +100,7 @@ def read_mesh(path: PATHS) -> MeshFile:
         raw = reader(checked_bytes(path))
         V, F = _checked_mesh(raw)
     except Exception as error:  # of whatever kind: libraries raise all sorts on a broken file
-        raise MeshFormatError(f"cannot read {path}: {_reason(error)}") from error
+        raise MeshFormatError(f"cannot read {path}: {reason(error)}") from error
     notices = []
     if len(F) > raw.faces:
         notices.append(f"polygons were cut: {raw.faces:,} faces became {len(F):,} triangles")
@@ -127,7 +135,7 @@ def write_mesh(path: PATHS, V: ArrayLike, F: ArrayLike) -> None:
         to_bytes = WRITERS[_known_suffix(path)]
         content = to_bytes(*_checked_mesh(_Raw(np.asarray(V), np.asarray(F), 0)))
     except Exception as error:
-        raise MeshFormatError(f"cannot write {path}: {_reason(error)}") from error
+        raise MeshFormatError(f"cannot write {path}: {reason(error)}") from error
     write_file(path, content)
 
 
@@ -143,7 +151,7 @@ def write_file(path: PATHS, content: bytes) -> None:
         target = Path(path).resolve()  # a link stays a link
         part = target.with_name(f".{secrets.token_hex(8)}.part")
     except (OSError, RuntimeError, ValueError) as error:
-        raise MeshFormatError(f"cannot write {path}: {_reason(error)}") from error
+        raise MeshFormatError(f"cannot write {path}: {reason(error)}") from error
     try:
         with open(part, "xb") as file:
             file.write(content)
@@ -153,7 +161,7 @@ def write_file(path: PATHS, content: bytes) -> None:
     except BaseException as error:
         part.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise MeshFormatError(f"cannot write {path}: {_reason(error)}") from error
+            raise MeshFormatError(f"cannot write {path}: {reason(error)}") from error
         raise
 
 
@@ -176,7 +184,7 @@ def check_writable(path: PATHS, suffixes: Sequence[str] = ()) -> None:
     try:
         obstacle = _obstacle(Path(path).resolve(), suffixes)
     except (OSError, RuntimeError, ValueError) as error:  # too long, a ring of links, a null byte
-        obstacle = _reason(error)
+        obstacle = reason(error)
     if obstacle:
         raise MeshFormatError(f"cannot write {path}: {obstacle}")
 
@@ -325,7 +333,7 @@ def _welded(V: FloatArray, F: IntArray) -> tuple[FloatArray, IntArray]:
     return V[first[order]], rank[group][F]
 
 
-def _reason(error: Exception) -> str:
+def reason(error: Exception) -> str:
     """Say in one line what went wrong."""
     if isinstance(error, MemoryError):
         return "there is not enough memory"

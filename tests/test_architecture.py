@@ -33,6 +33,7 @@ LEVELS = {
     6: [
         "laplacians", "solver", "motion", "fairing", "editing", "multiresolution", "smoothing",
         "_file_guards", "_ply_guard", "_mesh_writers", "mesh_files",
+        "_obj_data", "_ply_data", "_foreign_files", "data_files", "pyvista_accessor",
     ],
     7: [
         "evolver", "evolver.energies", "evolver.problem", "evolver.minimize",
@@ -75,6 +76,7 @@ SIDEWAYS = {
     *(("multiresolution", name) for name in ("editing", "fairing", "laplacians", "motion")),
     ("smoothing", "laplacians"), ("smoothing", "solver"),
     ("_ply_guard", "_file_guards"),
+    *(("data_files", name) for name in ("_foreign_files", "_obj_data", "_ply_data", "mesh_files")),
     ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
     ("evolver.problem", "evolver.energies"), ("evolver.minimize", "evolver.problem"),
     ("evolver.necks", "evolver.energies"),
