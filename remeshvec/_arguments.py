@@ -29,7 +29,9 @@ def parser() -> argparse.ArgumentParser:
     result = argparse.ArgumentParser(
         prog="remeshvec",
         description="Remesh a triangle mesh to even triangles.\n"
-        "Reads and writes OBJ, OFF, PLY, STL, and JSON with the keys verts and faces.",
+        "Reads and writes OBJ, OFF, PLY, STL, and JSON with the keys verts and faces; and what meshio\n"
+        "(VTK, VTU, Gmsh, XDMF, ...), pyvista (VTP) and trimesh (glTF) know, if installed.\n"
+        "Colours, texture coordinates, fields and groups come along if the format can hold them.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

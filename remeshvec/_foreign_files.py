@@ -16,6 +16,7 @@ from .objects import COLOUR, UV, read_pyvista, read_trimesh
 
 __all__ = ["can_write", "read_foreign", "write_foreign"]
 
+_OWN = ".obj, .off, .ply, .stl, .json"
 # What meshio would read too, but knows as a drawing, a table, or not on its own.
 _NOT_MESHIO = (".svg", ".xml", ".dat", ".post", ".post.gz", ".ele", ".node")
 _PYVISTA = (".vtp",)
@@ -41,13 +42,17 @@ def _library(suffix: str) -> tuple[str, Any]:
         library = importlib.import_module(name)
     except ImportError:
         raise ValueError(
-            f"files {suffix} are read by {name}, which is not installed (pip install {name})"
+            f"the suffix {suffix!r} is none of {_OWN}; {name}, which may know it, is not installed "
+            f"(pip install {name})"
         ) from None
     known = name != "meshio" or (
         suffix in library.extension_to_filetypes and suffix not in _NOT_MESHIO
     )
     if not known:
-        raise ValueError(f"the suffix {suffix!r} is not known")
+        raise ValueError(
+            f"the suffix {suffix!r} is none of {_OWN}, {', '.join(_PYVISTA + _TRIMESH)}, "
+            "and none that meshio knows"
+        )
     return name, library
 
 

@@ -17,15 +17,10 @@ import remeshvec
 
 from ._arguments import DEFAULT_FACTOR, parser
 from ._array_files import read_array, write_arrays
+from .data_files import check_data_writable, read_data, with_kept, write_data
 from .errors import OptionError, RemeshvecError
-from .mesh_files import (
-    SUFFIXES,
-    MeshFile,
-    check_writable,
-    read_mesh,
-    write_file,
-    write_mesh,
-)
+from .mesh_data import carry
+from .mesh_files import MeshFile, check_writable, write_file
 from .quality import quality, side_by_side
 from .result import RemeshResult
 from .sizing import Adaptive
@@ -75,15 +70,22 @@ def _run(options: argparse.Namespace) -> None:
     _check_outputs(options)
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
-        mesh = read_mesh(options.input)
+        data, notices = read_data(options.input)
+    mesh = MeshFile(data.V, data.F, notices)
     with _progress(options.quiet) as callback:
         result = remeshvec.remesh(
-            mesh.V, mesh.F, _length(options, mesh), callback=callback, **_library_options(options)
+            mesh.V,
+            mesh.F,
+            _length(options, mesh),
+            callback=callback,
+            **with_kept(data, _library_options(options)),
         )
     seconds |= result.report.seconds
     if options.output:
         with _timed(seconds, "write"):
-            write_mesh(options.output, result.V, result.F)
+            lost = write_data(options.output, carry(data, result))
+        if lost:
+            notices.append(f"{Path(options.output).suffix} files cannot hold: {', '.join(lost)}")
     if options.save_stats:
         _save_stats(options, mesh, result)
     if options.save_arrays:
@@ -101,7 +103,7 @@ def _run(options: argparse.Namespace) -> None:
 def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse before the work starts what could not be written or shown after it."""
     if options.output:
-        check_writable(options.output, SUFFIXES)
+        check_data_writable(options.output)
     for path in (options.save_stats, options.save_arrays):
         if path:
             check_writable(path)

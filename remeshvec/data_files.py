@@ -23,7 +23,7 @@ from .result import RemeshResult
 if TYPE_CHECKING:
     from typing import Unpack
 
-__all__ = ["check_data_writable", "read_data", "remesh_file", "write_data"]
+__all__ = ["check_data_writable", "read_data", "remesh_file", "with_kept", "write_data"]
 
 PATHS = str | os.PathLike[str]
 
@@ -62,7 +62,8 @@ def with_kept(data: MeshData, options: Any) -> dict[str, Any]:
     """Return the options, with what the data want to be kept."""
     given = options.get("preserve")
     several = given if isinstance(given, list | tuple) else [] if given is None else [given]
-    return {**options, "preserve": [*data.preserved(), *several] or None}
+    kept = [*data.preserved(), *several]
+    return {**options, "preserve": kept} if kept else dict(options)
 
 
 def read_data(path: PATHS) -> tuple[MeshData, list[str]]:

@@ -322,7 +322,8 @@ def _are_arrays(V: Any, F: Any) -> bool:
     """Tell two arrays from a mesh and, perhaps, a length."""
     is_length = F is None or isinstance(F, Real | str | Adaptive) or callable(F)
     is_pair = isinstance(V, tuple | list) and len(V) == 2
-    return not is_mesh_object(V) and not (is_length and (is_pair or not hasattr(V, "__array__")))
+    is_array = hasattr(V, "__array__") or isinstance(V, tuple | list)
+    return not is_mesh_object(V) and not (is_length and (is_pair or not is_array))
 
 
 def _only_length(F: Any, L: Any) -> tuple[Any]:

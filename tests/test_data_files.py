@@ -215,7 +215,7 @@ def test_broken_files_end_with_our_exception(tmp_path, suffix):
 
 
 def test_unknown_suffixes_are_named(tmp_path):
-    with pytest.raises(MeshFormatError, match=r"'.xyz' is not known|not installed"):
+    with pytest.raises(MeshFormatError, match=r"'.xyz' is none of"):
         write_data(tmp_path / "a.xyz", loaded_cube())
     with pytest.raises(MeshFormatError, match=r"read only|not installed"):
         remesh_file(obj_cube(tmp_path), tmp_path / "a.3mf")
