@@ -1,0 +1,240 @@
+"use strict";
+(() => {
+  const { scene, charts } = JSON.parse(document.getElementById("data").textContent);
+  const ids = ["view-before", "view-after"];
+  const config = { displayModeBar: false, displaylogo: false, responsive: true };
+  const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+  function unpack(text, type) {
+    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    return new type(bytes.buffer);
+  }
+
+  // Every third number, from the first, second and third on.
+  function columns(array) {
+    return [0, 1, 2].map((k) => array.filter((_, at) => at % 3 === k));
+  }
+
+  const meshes = scene.meshes.map((packed) => ({
+    vertices: unpack(packed.vertices, Float32Array),
+    faces: unpack(packed.faces, Uint32Array),
+    levels: Object.fromEntries(
+      Object.entries(packed.levels).map(([key, text]) => [key, unpack(text, Uint8Array)])
+    ),
+  }));
+
+  // Undirected edges, each once: sorted numbers of pairs, below 2^53 for any mesh that fits here.
+  function edgesOf(mesh) {
+    const { faces } = mesh;
+    const n = mesh.vertices.length / 3;
+    const keys = new Float64Array(faces.length);
+    for (let h = 0; h < faces.length; h++) {
+      const a = faces[h], b = faces[h % 3 === 2 ? h - 2 : h + 1];
+      keys[h] = Math.min(a, b) * n + Math.max(a, b);
+    }
+    keys.sort();
+    return keys.filter((key, at) => at === 0 || key !== keys[at - 1])
+      .reduce((pairs, key) => (pairs.push([Math.floor(key / n), key % n]), pairs), []);
+  }
+
+  function edgeTrace(mesh) {
+    const pairs = edgesOf(mesh);
+    const at = [0, 1, 2].map(() => new Float32Array(3 * pairs.length));
+    let total = 0;
+    pairs.forEach(([a, b], k) => {
+      let squared = 0;
+      for (let c = 0; c < 3; c++) {
+        const from = mesh.vertices[3 * a + c], to = mesh.vertices[3 * b + c];
+        at[c].set([from, to, NaN], 3 * k);
+        squared += (from - to) ** 2;
+      }
+      total += Math.sqrt(squared);
+    });
+    mesh.meanEdge = total / Math.max(pairs.length, 1);
+    return {
+      type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], connectgaps: false,
+      hoverinfo: "skip", line: { color: style("--wire"), width: 1 },
+    };
+  }
+
+  function faceTrace(mesh, colouring) {
+    const [x, y, z] = columns(mesh.vertices);
+    const [i, j, k] = columns(mesh.faces);
+    return {
+      type: "mesh3d", x, y, z, i, j, k, hoverinfo: "skip", showscale: false, flatshading: true,
+      intensitymode: "cell", ...colours(mesh, colouring),
+      lighting: {
+        ambient: 0.62, diffuse: 0.5, specular: 0.03, roughness: 0.9, fresnel: 0,
+        facenormalsepsilon: 0, vertexnormalsepsilon: 1e-12,
+      },
+    };
+  }
+
+  const stops = (list) => list.map((colour, k) => [k / (list.length - 1), colour]);
+
+  function colours(mesh, colouring) {
+    return {
+      intensity: Array.from(mesh.levels[colouring.key], (level) => level / 255),
+      cmin: 0, cmax: 1, colorscale: stops(colouring.colours),
+    };
+  }
+
+  // The eye as far away as the object needs to fit into a view of this shape. Plotly's cube has edges
+  // of length 1 and holds coordinates from -1 to 1; its lens sees 45 degrees upwards.
+  function firstCamera(view) {
+    const [across, upwards, near] = scene.camera.half.map((half) => half / 2);
+    const need = Math.max(upwards, across / (view.clientWidth / view.clientHeight));
+    const distance = 1.04 * need / Math.tan(Math.PI / 8) + 0.6 * near || 1;
+    const [x, y, z] = scene.camera.eye.map((e) => e * distance);
+    const [a, b, c] = scene.camera.up;
+    return { eye: { x, y, z }, up: { x: a, y: b, z: c }, center: { x: 0, y: 0, z: 0 } };
+  }
+
+  function viewLayout(view) {
+    const axis = { visible: false, range: [-1.01, 1.01], autorange: false };
+    return {
+      margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "rgba(0,0,0,0)",
+      scene: {
+        xaxis: axis, yaxis: axis, zaxis: axis, aspectmode: "cube", dragmode: "orbit",
+        hovermode: false, bgcolor: "rgba(0,0,0,0)", camera: firstCamera(view),
+      },
+    };
+  }
+
+  const views = ids.map((id) => document.getElementById(id));
+  const cameraOf = (view) => view._fullLayout.scene._scene.getCamera();
+  const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
+
+  // Turning one view turns the other; a view that already looks so is left alone, which ends the echo.
+  function link(view, other) {
+    let waiting = false;
+    const follow = () => {
+      if (waiting) return;
+      waiting = true;
+      requestAnimationFrame(() => {
+        waiting = false;
+        const camera = cameraOf(view);
+        if (!same(camera, cameraOf(other))) Plotly.relayout(other, { "scene.camera": camera });
+      });
+    };
+    view.on("plotly_relayouting", follow);
+    view.on("plotly_relayout", follow);
+  }
+
+  function showLegend(colouring) {
+    const list = stops(colouring.colours).map(([at, colour]) => `${colour} ${100 * at}%`);
+    document.getElementById("ramp").style.background = `linear-gradient(to right, ${list})`;
+    const legend = document.getElementById("legend");
+    legend.title = colouring.title;
+    const ticks = document.getElementById("ticks");
+    ticks.replaceChildren(...colouring.ticks.map((text) => {
+      const tick = document.createElement("span");
+      tick.textContent = text;
+      return tick;
+    }));
+  }
+
+  function choose(colouring) {
+    showLegend(colouring);
+    return Promise.all(views.map((view, k) => {
+      const { intensity, colorscale } = colours(meshes[k], colouring);
+      return Plotly.restyle(view, { intensity: [intensity], colorscale: [colorscale] }, [0]);
+    }));
+  }
+
+  function addColourings() {
+    const box = document.getElementById("colourings");
+    scene.colourings.forEach((colouring, k) => {
+      const label = document.createElement("label");
+      const input = document.createElement("input");
+      Object.assign(input, { type: "radio", name: "colouring", value: colouring.key, checked: !k });
+      input.addEventListener("change", () => choose(colouring));
+      label.title = colouring.title;
+      label.append(input, colouring.name);
+      box.append(label);
+    });
+    showLegend(scene.colourings[0]);
+  }
+
+  function addControls() {
+    const edges = document.getElementById("edges");
+    if (scene.edges) {
+      edges.addEventListener("change", () =>
+        views.forEach((view) => Plotly.restyle(view, { visible: edges.checked }, [1])));
+    } else {
+      edges.parentElement.remove();
+    }
+    document.getElementById("reset").addEventListener("click", () =>
+      views.forEach((view) => Plotly.relayout(view, { "scene.camera": firstCamera(view) })));
+  }
+
+  async function drawView(view, mesh) {
+    const traces = [faceTrace(mesh, scene.colourings[0])];
+    if (scene.edges) traces.push(edgeTrace(mesh));
+    await Plotly.newPlot(view, mesh.faces.length ? traces : [], viewLayout(view), config);
+  }
+
+  function bars(chart, k) {
+    return {
+      type: "bar", name: ["before", "after"][k], x: chart.centres, y: chart.percent[k],
+      width: chart.width, customdata: chart.counts[k], opacity: 0.62,
+      marker: { color: style(["--before", "--after"][k]), line: { width: 0 } },
+      hovertemplate: "%{y:.1f} % (%{customdata:,})",
+    };
+  }
+
+  function chartLayout(chart) {
+    const axis = { gridcolor: style("--rule"), zeroline: false, fixedrange: true, automargin: true };
+    const line = { color: style("--faint"), width: 1.5, dash: "dash" };
+    return {
+      barmode: "overlay", bargap: 0, showlegend: false, hovermode: "x unified",
+      margin: { l: 45, r: 10, t: 30, b: 40 },
+      font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: style("--ink") },
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      hoverlabel: { bgcolor: style("--card") },
+      title: { text: chart.name, font: { size: 15 }, x: 0, xref: "paper", y: 0.97, yanchor: "top" },
+      xaxis: {
+        ...axis, showgrid: false, title: { text: chart.axis },
+        ...(chart.whole ? { dtick: 1 } : {}),
+      },
+      yaxis: { ...axis, ticksuffix: " %", rangemode: "tozero" },
+      shapes: [{
+        type: "line", x0: chart.ideal, x1: chart.ideal, y0: 0, y1: 1, yref: "paper", line,
+      }],
+    };
+  }
+
+  function drawCharts() {
+    return Promise.all(charts.map((chart, k) => {
+      const id = `chart-${k}`;
+      let place = document.getElementById(id);
+      if (!place) {
+        place = Object.assign(document.createElement("div"), { id });
+        document.getElementById("charts").append(place);
+      }
+      return Plotly.react(place, [bars(chart, 0), bars(chart, 1)], chartLayout(chart), config);
+    }));
+  }
+
+  function followTheme() {
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      drawCharts();
+      if (scene.edges) {
+        views.forEach((view) => Plotly.restyle(view, { "line.color": style("--wire") }, [1]));
+      }
+    });
+  }
+
+  async function draw() {
+    addColourings();
+    await drawCharts();
+    await Promise.all(views.map((view, k) => drawView(view, meshes[k])));
+    link(views[0], views[1]);
+    link(views[1], views[0]);
+    addControls();
+    followTheme();
+    document.documentElement.dataset.state = "drawn"; // what the tests wait for
+  }
+
+  draw();
+})();
