@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .quality import Elements
+from .quality import Elements, Quality
 from .viz import UP, Camera, three_quarter_view
 
 __all__ = ["COLOURINGS", "MOST_EDGED", "MOST_FACES", "Views", "build_views"]
@@ -17,8 +17,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 # What a browser turns smoothly without a graphics card; `docs/html.md` has the seconds.
-MOST_FACES = 200_000  # of a mesh; of a larger one the views show a part
-MOST_EDGED = 100_000  # faces with edges drawn
+MOST_FACES = 200_000  # of a mesh
+MOST_EDGED = 50_000  # faces with edges drawn, and of the part that is shown of a larger mesh
 
 # Red to blue [ColorBrewer, RdYlBu] and brown to green [BrBG]: told apart by the colour-blind too.
 _SHAPE_COLOURS = ("#7d0a1e", "#c8282c", "#ee6a43", "#fbb165", "#fdebb0", "#cfe6f0", "#8dbfdd")
@@ -56,13 +56,17 @@ class Views(NamedTuple):
     notes: list[str]
 
 
-def build_views(before: Elements, after: Elements, length: float, up: str) -> Views:
+def build_views(
+    meshes: tuple[Elements, Elements], qualities: tuple[Quality, Quality], length: float, up: str
+) -> Views:
     """Make the scene of two meshes under one camera.
 
     Parameters
     ----------
-    before, after : Elements
-        The meshes.
+    meshes : (Elements, Elements)
+        Before and after.
+    qualities : (Quality, Quality)
+        Measures of the same meshes, whose volumes tell where outside is.
     length : float
         The target length L that areas are compared with.
     up : {"y", "z"}
@@ -74,24 +78,23 @@ def build_views(before: Elements, after: Elements, length: float, up: str) -> Vi
         Coordinates are relative to the middle of what is shown and at most 1 from it, float32: so
         neither size nor place costs digits.
     """
-    meshes = (before, after)
-    camera = three_quarter_view(before.V, before.F, UP[up])
+    camera = three_quarter_view(meshes[0].V, meshes[0].F, UP[up])
     shown = _shown_faces(meshes, camera)
     corners = [
         mesh.V[mesh.F[kept]].reshape(-1, 3) for mesh, kept in zip(meshes, shown, strict=True)
     ]
-    middle, half = _frame(np.concatenate(corners), camera)
+    middle = _middle(np.concatenate(corners))
     reach = max(float(np.linalg.norm(P - middle, axis=1).max(initial=0)) for P in corners) or 1.0
     faces = max(map(len, shown))
     scene = {
         "meshes": [
-            _mesh(mesh, kept, middle, reach, length)
-            for mesh, kept in zip(meshes, shown, strict=True)
+            {**_mesh(mesh, kept, middle, reach, length), "sides": _sides(quality)}
+            for mesh, kept, quality in zip(meshes, shown, qualities, strict=True)
         ],
         "camera": {
             "eye": camera.eye.tolist(),
+            "right": camera.right.tolist(),
             "up": camera.up.tolist(),
-            "half": (half / reach).tolist(),
         },
         "edges": faces <= MOST_EDGED,
         "colourings": COLOURINGS,
@@ -106,20 +109,12 @@ def _shown_faces(meshes: tuple[Elements, Elements], camera: Camera) -> list[IntA
     first = meshes[0].V[meshes[0].F].mean(axis=1)
     near = first[np.argmax(first @ camera.eye)]
     distances = [np.linalg.norm(mesh.V[mesh.F].mean(axis=1) - near, axis=1) for mesh in meshes]
-    radius = min(np.sort(d)[min(MOST_FACES, len(d)) - 1] for d in distances if len(d) > MOST_FACES)
-    # Cut after sorting, stably: many faces may be equally far.
-    inside = [np.argsort(d, kind="stable")[: np.count_nonzero(d <= radius)] for d in distances]
-    return [np.sort(kept[:MOST_FACES]) for kept in inside]
+    radius = min(np.sort(d)[MOST_EDGED] for d in distances if len(d) > MOST_EDGED)
+    return [np.flatnonzero(d < radius) for d in distances]
 
 
-def _frame(points: FloatArray, camera: Camera) -> tuple[FloatArray, FloatArray]:
-    """Return the middle of the points, and half their extents to the right, up, and towards the eye."""
-    if not len(points):
-        return np.zeros(3), np.zeros(3)
-    axes = np.stack([camera.right, camera.up, camera.eye])
-    along = points @ axes.T
-    low, high = along.min(axis=0), along.max(axis=0)
-    return (low + high) / 2 @ axes, (high - low) / 2
+def _middle(points: FloatArray) -> FloatArray:
+    return (points.min(axis=0) + points.max(axis=0)) / 2 if len(points) else np.zeros(3)
 
 
 def _mesh(
@@ -142,6 +137,13 @@ def _mesh(
             for name, level in levels.items()
         },
     }
+
+
+def _sides(quality: Quality) -> list[int]:
+    """Return the sides that edges are drawn on: that of the normals 1, the other -1."""
+    if quality.volume is None:
+        return [1, -1]
+    return [1] if quality.volume >= 0 else [-1]
 
 
 def _packed(array: NDArray[Any], dtype: str) -> str:

@@ -55,7 +55,7 @@ def html_report(result: RemeshResult, *, title: str = "", command: str = "", up:
     It has both meshes in linked 3D views, coloured by shape, smallest angle or area of the faces;
     histograms of edge lengths, angles, valences and areas over each other; the measures; the options,
     sweeps and version. Of meshes with more than 200,000 faces the views show a part; edges are drawn
-    up to 100,000 faces. The page says so.
+    up to 50,000 faces. The page says so.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def html_report(result: RemeshResult, *, title: str = "", command: str = "", up:
     report = result.report
     qualities = (report.quality_before, report.quality_after)
     measured = (elements(*report.before), elements(*report.after))
-    views = build_views(*measured, report.target_length, up)
+    views = build_views(measured, qualities, report.target_length, up)
     charts = build_charts(measured, qualities, report.target_length)
     return Template(_part("report.html")).substitute(
         title=_text(title or "Remeshing report"),

@@ -3,6 +3,7 @@
   const { scene, charts } = JSON.parse(document.getElementById("data").textContent);
   const ids = ["view-before", "view-after"];
   const config = { displayModeBar: false, displaylogo: false, responsive: true };
+  const LIFT = 0.002; // of edges above the faces; the surface reaches from -1 to 1
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
   function unpack(text, type) {
@@ -18,6 +19,7 @@
   const meshes = scene.meshes.map((packed) => ({
     vertices: unpack(packed.vertices, Float32Array),
     faces: unpack(packed.faces, Uint32Array),
+    sides: packed.sides,
     levels: Object.fromEntries(
       Object.entries(packed.levels).map(([key, text]) => [key, unpack(text, Uint8Array)])
     ),
@@ -33,24 +35,46 @@
       keys[h] = Math.min(a, b) * n + Math.max(a, b);
     }
     keys.sort();
-    return keys.filter((key, at) => at === 0 || key !== keys[at - 1])
-      .reduce((pairs, key) => (pairs.push([Math.floor(key / n), key % n]), pairs), []);
+    const once = keys.filter((key, at) => at === 0 || key !== keys[at - 1]);
+    return [once.map((key) => Math.floor(key / n)), once.map((key) => key % n)];
   }
 
-  function edgeTrace(mesh) {
-    const pairs = edgesOf(mesh);
-    const at = [0, 1, 2].map(() => new Float32Array(3 * pairs.length));
-    let total = 0;
-    pairs.forEach(([a, b], k) => {
-      let squared = 0;
+  // Directions at the vertices, area-weighted; zero where there is no area.
+  function normalsOf({ vertices, faces }) {
+    const normals = new Float32Array(vertices.length);
+    for (let f = 0; f < faces.length; f += 3) {
+      const [p, q, r] = [0, 1, 2].map((c) => 3 * faces[f + c]);
+      const u = [0, 1, 2].map((c) => vertices[q + c] - vertices[p + c]);
+      const v = [0, 1, 2].map((c) => vertices[r + c] - vertices[p + c]);
       for (let c = 0; c < 3; c++) {
-        const from = mesh.vertices[3 * a + c], to = mesh.vertices[3 * b + c];
-        at[c].set([from, to, NaN], 3 * k);
-        squared += (from - to) ** 2;
+        const along = u[(c + 1) % 3] * v[(c + 2) % 3] - u[(c + 2) % 3] * v[(c + 1) % 3];
+        for (const corner of [p, q, r]) normals[corner + c] += along;
       }
-      total += Math.sqrt(squared);
+    }
+    for (let v = 0; v < normals.length; v += 3) {
+      const length = Math.hypot(normals[v], normals[v + 1], normals[v + 2]) || 1;
+      for (let c = 0; c < 3; c++) normals[v + c] /= length;
+    }
+    return normals;
+  }
+
+  // Edges that lie in the faces would be lost in rounding, so they are drawn a little above them:
+  // outside where there is an outside, else on both sides.
+  function edgeTrace(mesh) {
+    const ends = edgesOf(mesh);
+    const normals = normalsOf(mesh);
+    const count = ends[0].length;
+    const at = [0, 1, 2].map(() => new Float32Array(3 * mesh.sides.length * count).fill(NaN));
+    mesh.sides.forEach((side, turn) => {
+      const lifted = mesh.vertices.map((x, i) => x + side * LIFT * normals[i]);
+      for (let k = 0; k < count; k++) {
+        const start = 3 * (turn * count + k); // the third point stays NaN: no line to the next edge
+        for (let c = 0; c < 3; c++) {
+          at[c][start] = lifted[3 * ends[0][k] + c];
+          at[c][start + 1] = lifted[3 * ends[1][k] + c];
+        }
+      }
     });
-    mesh.meanEdge = total / Math.max(pairs.length, 1);
     return {
       type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], connectgaps: false,
       hoverinfo: "skip", line: { color: style("--wire"), width: 1 },
@@ -63,8 +87,9 @@
     return {
       type: "mesh3d", x, y, z, i, j, k, hoverinfo: "skip", showscale: false, flatshading: true,
       intensitymode: "cell", ...colours(mesh, colouring),
+      lightposition: { x: -30, y: 90, z: -1 }, // beside the eye, which it follows
       lighting: {
-        ambient: 0.62, diffuse: 0.5, specular: 0.03, roughness: 0.9, fresnel: 0,
+        ambient: 0.55, diffuse: 0.5, specular: 0.03, roughness: 0.9, fresnel: 0,
         facenormalsepsilon: 0, vertexnormalsepsilon: 1e-12,
       },
     };
@@ -79,15 +104,42 @@
     };
   }
 
-  // The eye as far away as the object needs to fit into a view of this shape. Plotly's cube has edges
-  // of length 1 and holds coordinates from -1 to 1; its lens sees 45 degrees upwards.
+  // The camera of the first view, moved until everything fits into a picture of this shape: the lens
+  // sees 45 degrees upwards, and what is near looks larger. Plotly's cube, from -1 to 1 for us, has
+  // edges of length 1 for its camera.
   function firstCamera(view) {
-    const [across, upwards, near] = scene.camera.half.map((half) => half / 2);
-    const need = Math.max(upwards, across / (view.clientWidth / view.clientHeight));
-    const distance = 1.04 * need / Math.tan(Math.PI / 8) + 0.6 * near || 1;
-    const [x, y, z] = scene.camera.eye.map((e) => e * distance);
-    const [a, b, c] = scene.camera.up;
-    return { eye: { x, y, z }, up: { x: a, y: b, z: c }, center: { x: 0, y: 0, z: 0 } };
+    const { right, up, eye } = scene.camera;
+    const top = 0.95 * Math.tan(Math.PI / 8), side = top * view.clientWidth / view.clientHeight;
+    let distance = 2, x = 0, y = 0;
+    for (let round = 0; round < 6; round++) {
+      const [west, east, south, north] = onScreen(x, y, distance);
+      x += (west + east) / 2 * distance;
+      y += (south + north) / 2 * distance;
+      distance *= Math.max((east - west) / 2 / side, (north - south) / 2 / top, 0.3);
+    }
+    const centre = [0, 1, 2].map((c) => x * right[c] + y * up[c]);
+    const named = ([a, b, c]) => ({ x: a, y: b, z: c });
+    return {
+      eye: named(centre.map((m, c) => m + distance * eye[c])), up: named(up), center: named(centre),
+    };
+  }
+
+  // How far what is seen from there reaches to the left, right, down and up, in slopes.
+  function onScreen(x, y, distance) {
+    const { right, up, eye } = scene.camera;
+    const dot = (v, at, axis) => (v[at] * axis[0] + v[at + 1] * axis[1] + v[at + 2] * axis[2]) / 2;
+    const reach = [Infinity, -Infinity, Infinity, -Infinity];
+    for (const { vertices } of meshes) {
+      for (let v = 0; v < vertices.length; v += 3) {
+        const depth = Math.max(distance - dot(vertices, v, eye), 0.05);
+        const across = (dot(vertices, v, right) - x) / depth, upwards = (dot(vertices, v, up) - y) / depth;
+        reach[0] = Math.min(reach[0], across);
+        reach[1] = Math.max(reach[1], across);
+        reach[2] = Math.min(reach[2], upwards);
+        reach[3] = Math.max(reach[3], upwards);
+      }
+    }
+    return reach.every(Number.isFinite) ? reach : [-1, 1, -1, 1];
   }
 
   function viewLayout(view) {
