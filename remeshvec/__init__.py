@@ -22,6 +22,7 @@ from .sizing import Adaptive
 if TYPE_CHECKING:
     from .editing import Editor, deform
     from .fairing import fair
+    from .html_page import html_report, show_html, write_html
     from .laplacians import cotangent_matrix, laplacian, vertex_areas
     from .multiresolution import EditedSurface, MultiresolutionEditor
     from .smoothing import smooth
@@ -48,13 +49,16 @@ __all__ = [
     "cotangent_matrix",
     "deform",
     "fair",
+    "html_report",
     "laplacian",
     "quality",
     "read_mesh",
     "remesh",
+    "show_html",
     "smooth",
     "surface_distance",
     "vertex_areas",
+    "write_html",
     "write_mesh",
 ]
 
@@ -67,9 +71,12 @@ _LATE = {
     "cotangent_matrix": "laplacians",
     "deform": "editing",
     "fair": "fairing",
+    "html_report": "html_page",
     "laplacian": "laplacians",
+    "show_html": "html_page",
     "smooth": "smoothing",
     "vertex_areas": "laplacians",
+    "write_html": "html_page",
 }
 
 

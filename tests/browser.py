@@ -69,7 +69,7 @@ class Browser:
 
     def close(self):
         """End the browser."""
-        session, self._session = self._session, None
+        self._session = None
         with contextlib.suppress(OSError, TimeoutError):
             self.call("Browser.close")
         try:
@@ -79,7 +79,6 @@ class Browser:
             self._process.wait()
         os.close(self._read)
         os.close(self._write)
-        return session
 
     def call(self, method, *, patience=60.0, **params):
         """Call a method of the DevTools protocol and return its result."""
@@ -146,15 +145,15 @@ class Browser:
         return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
 
     def complaints(self):
-        """Return errors and warnings that the page has given."""
+        """Return the errors that the page has given."""
         found = []
         for event in self.events:
             method, params = event.get("method"), event.get("params", {})
             if method == "Runtime.exceptionThrown":
                 found.append(json.dumps(params["exceptionDetails"])[:500])
-            if method == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning"):
+            if method == "Runtime.consoleAPICalled" and params["type"] == "error":
                 found.append(json.dumps(params["args"])[:500])
-            if method == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
+            if method == "Log.entryAdded" and params["entry"]["level"] == "error":
                 found.append(params["entry"]["text"])
         return found
 

@@ -7,7 +7,9 @@
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
   function unpack(text, type) {
-    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    const letters = atob(text);
+    const bytes = new Uint8Array(letters.length);
+    for (let k = 0; k < letters.length; k++) bytes[k] = letters.charCodeAt(k);
     return new type(bytes.buffer);
   }
 
@@ -60,7 +62,7 @@
 
   // Edges that lie in the faces would be lost in rounding, so they are drawn a little above them:
   // outside where there is an outside, else on both sides.
-  function edgeTrace(mesh) {
+  function edgeTrace(mesh, view) {
     const ends = edgesOf(mesh);
     const normals = normalsOf(mesh);
     const count = ends[0].length;
@@ -77,8 +79,21 @@
     });
     return {
       type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], connectgaps: false,
-      hoverinfo: "skip", line: { color: style("--wire"), width: 1 },
+      hoverinfo: "skip", line: wire(mesh, view),
     };
+  }
+
+  // Thin lines, fainter where they are too dense to tell apart.
+  function wire(mesh, view) {
+    const { vertices, faces } = mesh;
+    let total = 0;
+    for (let h = 0; h < faces.length; h += 3) {
+      const a = 3 * faces[h], b = 3 * faces[h + 1];
+      total += Math.hypot(...[0, 1, 2].map((c) => vertices[a + c] - vertices[b + c]));
+    }
+    const pixels = total / (faces.length / 3) * view.clientHeight / 2;
+    const alpha = Math.min(Math.max(pixels / 12, 0.35), 0.8);
+    return { color: `rgba(${style("--wire")}, ${alpha.toFixed(2)})`, width: pixels > 40 ? 2 : 1 };
   }
 
   function faceTrace(mesh, colouring) {
@@ -176,8 +191,7 @@
   function showLegend(colouring) {
     const list = stops(colouring.colours).map(([at, colour]) => `${colour} ${100 * at}%`);
     document.getElementById("ramp").style.background = `linear-gradient(to right, ${list})`;
-    const legend = document.getElementById("legend");
-    legend.title = colouring.title;
+    document.getElementById("meaning").textContent = colouring.title;
     const ticks = document.getElementById("ticks");
     ticks.replaceChildren(...colouring.ticks.map((text) => {
       const tick = document.createElement("span");
@@ -222,7 +236,7 @@
 
   async function drawView(view, mesh) {
     const traces = [faceTrace(mesh, scene.colourings[0])];
-    if (scene.edges) traces.push(edgeTrace(mesh));
+    if (scene.edges) traces.push(edgeTrace(mesh, view));
     await Plotly.newPlot(view, mesh.faces.length ? traces : [], viewLayout(view), config);
   }
 
@@ -272,7 +286,8 @@
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
       drawCharts();
       if (scene.edges) {
-        views.forEach((view) => Plotly.restyle(view, { "line.color": style("--wire") }, [1]));
+        views.forEach((view, k) =>
+          Plotly.restyle(view, { "line.color": wire(meshes[k], view).color }, [1]));
       }
     });
   }
