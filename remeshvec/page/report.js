@@ -170,7 +170,9 @@
 
   const views = ids.map((id) => document.getElementById(id));
   const cameraOf = (view) => view._fullLayout.scene._scene.getCamera();
-  const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
+  // Plotly gives a camera back with other rounding than it was set with.
+  const same = (one, other) => ["eye", "center", "up"].every((what) =>
+    ["x", "y", "z"].every((axis) => Math.abs(one[what][axis] - other[what][axis]) < 1e-6));
 
   // Turning one view turns the other; a view that already looks so is left alone, which ends the echo.
   function link(view, other) {
