@@ -106,6 +106,7 @@ def html_report(result: RemeshResult, *, title: str = "", command: str = "", up:
         ),
         call=_call(report, command),
         options=_table(_options(report)),
+        seconds=_table([(_words(name), f"{s:.4f}") for name, s in report.seconds.items()]),
         sweeps=_sweeps(report.sweeps),
         version=_text(remeshvec.__version__),
         style=_part("report.css"),
