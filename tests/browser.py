@@ -158,9 +158,7 @@ class Browser:
         return found
 
     def requests(self):
-        """Return the addresses that the page has asked for."""
-        return [
-            event["params"]["request"]["url"]
-            for event in self.events
-            if event.get("method") == "Network.requestWillBeSent"
-        ]
+        """Return the addresses that the page has asked for, but those that are data themselves."""
+        sent = [one for one in self.events if one.get("method") == "Network.requestWillBeSent"]
+        urls = [event["params"]["request"]["url"] for event in sent]
+        return [url for url in urls if not url.startswith("data:")]

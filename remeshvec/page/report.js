@@ -294,10 +294,17 @@
     });
   }
 
+  // Lets the browser show what there is: words at once, then charts, then one view after the other.
+  const pause = () => new Promise((done) => setTimeout(done, 20));
+
   async function draw() {
     addColourings();
+    await pause();
     await drawCharts();
-    await Promise.all(views.map((view, k) => drawView(view, meshes[k])));
+    for (const [k, view] of views.entries()) {
+      await pause();
+      await drawView(view, meshes[k]);
+    }
     link(views[0], views[1]);
     link(views[1], views[0]);
     addControls();
