@@ -128,7 +128,8 @@ class Browser:
         self.events.clear()
         start = time.monotonic()
         self.call("Page.navigate", url=url)
-        self.wait(f"location.href === {json.dumps(url)} && document.documentElement?.dataset.state")
+        loaded = f"location.href === {json.dumps(url)} && document.readyState === 'complete'"
+        self.wait(f"{loaded} && document.documentElement.dataset.state")
         self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         return time.monotonic() - start
 
