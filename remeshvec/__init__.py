@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .data_files import remesh_file
     from .editing import Editor, deform
     from .fairing import fair
+    from .html_page import html_report, show_html, write_html
     from .laplacians import cotangent_matrix, laplacian, vertex_areas
     from .multiresolution import EditedSurface, MultiresolutionEditor
     from .smoothing import smooth
@@ -50,14 +51,17 @@ __all__ = [
     "cotangent_matrix",
     "deform",
     "fair",
+    "html_report",
     "laplacian",
     "quality",
     "read_mesh",
     "remesh",
     "remesh_file",
+    "show_html",
     "smooth",
     "surface_distance",
     "vertex_areas",
+    "write_html",
     "write_mesh",
 ]
 
@@ -70,10 +74,13 @@ _LATE = {
     "cotangent_matrix": "laplacians",
     "deform": "editing",
     "fair": "fairing",
+    "html_report": "html_page",
     "laplacian": "laplacians",
     "remesh_file": "data_files",
+    "show_html": "html_page",
     "smooth": "smoothing",
     "vertex_areas": "laplacians",
+    "write_html": "html_page",
 }
 
 

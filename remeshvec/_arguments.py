@@ -17,6 +17,7 @@ examples:
   remeshvec cat.obj -o even.obj                       write the new mesh
   remeshvec part.stl -o part.ply --length 0.5         edges of length 0.5
   remeshvec cat.obj -o even.obj --picture even.png    and a picture of both
+  remeshvec cat.obj --html report.html                a page to look at and to send around
   remeshvec part.stl -o part.ply --feature-angle 30   keep edges that turn by more than 30 degrees
   remeshvec cat.obj -o fine.obj --adaptive 0.001      short edges where the surface is curved
 
@@ -178,9 +179,17 @@ def _add_report_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--picture", metavar="FILE", help="render both meshes side by side (PNG or JPEG)"
     )
+    group.add_argument(
+        "--html",
+        metavar="FILE",
+        help="write a page that shows both meshes, histograms and measures",
+    )
     group.add_argument("--visualize", action="store_true", help="show both meshes in a window")
     group.add_argument(
-        "--up", choices=("y", "z"), default="y", help="axis that points up in pictures (default y)"
+        "--up",
+        choices=("y", "z"),
+        default="y",
+        help="axis that points up in what is shown (default y)",
     )
     group.add_argument("--timing", action="store_true", help="show the seconds of every phase")
     group.add_argument("--quiet", action="store_true", help="show errors only")

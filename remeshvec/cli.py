@@ -6,6 +6,7 @@ import argparse
 import json
 import math
 import os
+import shlex
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -44,7 +45,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         Exit status: 0, 2 for bad input, 130 after Ctrl-C, 1 where memory or the terminal failed.
     """
-    options = parser().parse_args(argv)
+    arguments = sys.argv[1:] if argv is None else list(argv)
+    options = parser().parse_args(arguments)
+    options.call = shlex.join(["remeshvec", *arguments])
     try:
         _run(options)
         sys.stdout.flush()
@@ -92,6 +95,8 @@ def _run(options: argparse.Namespace) -> None:
         write_arrays(options.save_arrays, result)
     if options.picture:
         _make_picture(options, mesh, result)
+    if options.html:
+        _write_page(options, result)
     if not options.quiet:
         _print_report(options, mesh, result, seconds)
     if options.visualize:
@@ -113,12 +118,22 @@ def _check_outputs(options: argparse.Namespace) -> None:
         viz.require_viewer(window=options.visualize)
         if options.picture:
             check_writable(options.picture, viz.PICTURE_SUFFIXES)
-    named = [options.output, options.save_stats, options.save_arrays, options.picture]
-    paths = [Path(name).resolve() for name in named if name]
+    if options.html:
+        from . import html_page
+
+        html_page.require_plotly()
+        check_writable(options.html, html_page.PAGE_SUFFIXES)
+    paths = [Path(name).resolve() for name in _outputs(options)]
     if len(set(paths)) < len(paths):
         raise OptionError("all files to be written need names of their own")
     if Path(options.input).resolve() in paths[bool(options.output) :]:
         raise OptionError(f"what is written beside the mesh would replace {options.input}")
+
+
+def _outputs(options: argparse.Namespace) -> list[str]:
+    """Return the files that are to be written, the mesh first."""
+    named = [options.output, options.save_stats, options.save_arrays, options.picture, options.html]
+    return [name for name in named if name]
 
 
 def _length(options: argparse.Namespace, mesh: MeshFile) -> Any:
@@ -230,6 +245,13 @@ def _make_picture(options: argparse.Namespace, mesh: MeshFile, result: RemeshRes
     viz.picture(options.picture, (mesh.V, mesh.F), (result.V, result.F), up=options.up)
 
 
+def _write_page(options: argparse.Namespace, result: RemeshResult) -> None:
+    from . import html_page
+
+    title = Path(options.input).name
+    html_page.write_html(options.html, result, title=title, command=options.call, up=options.up)
+
+
 def _save_stats(options: argparse.Namespace, mesh: MeshFile, result: RemeshResult) -> None:
     content = {
         "input": options.input,
@@ -275,8 +297,7 @@ def _print_report(
         for name, passed in seconds.items():
             print(f"{'remesh, total' if name == 'total' else name:<31}{passed:>12.3f} s")
         print()
-    for path in (options.output, options.save_stats, options.save_arrays, options.picture):
-        if path:
-            print(f"written: {path}")
+    for path in _outputs(options):
+        print(f"written: {path}")
     if not options.output:
         print("no mesh was written; -o FILE writes it")

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._check import as_mesh
 from .errors import OptionError
 
-__all__ = ["Quality", "quality", "side_by_side"]
+__all__ = ["Elements", "Quality", "elements", "quality", "side_by_side"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -151,7 +151,7 @@ def quality(V: ArrayLike, F: ArrayLike, L: float | None = None) -> Quality:
     if L is not None and not (np.isfinite(L) and L > 0):
         raise OptionError(f"L must be a positive length, got {L!r}")
     V, F = as_mesh(V, F)
-    repeated = (F[:, 0] == F[:, 1]) | (F[:, 1] == F[:, 2]) | (F[:, 2] == F[:, 0])
+    repeated = _is_repeated(F)
     used, F = _referenced(F[~repeated], len(V))
     X, unit = _unit_box(V[used])
     corners = _corner_geometry(X, F)
@@ -181,6 +181,36 @@ def side_by_side(before: Quality, after: Quality) -> str:
     return "\n".join(lines)
 
 
+class Elements(NamedTuple):
+    """Measures of every single edge and face, for histograms and pictures."""
+
+    V: FloatArray  # (n, 3), vertices that a face uses, in the units of the input
+    F: IntArray  # (m, 3), faces that name three vertices, as indices into V
+    edge_lengths: FloatArray  # (e,)
+    angles: FloatArray  # (m, 3), degrees
+    areas: FloatArray  # (m,)
+    radius_ratios: FloatArray  # (m,), 2 r_in / R_circ: 1 equilateral, 0 degenerate
+
+
+def elements(V: ArrayLike, F: ArrayLike) -> Elements:
+    """Measure every edge and face; parameters and errors are those of `quality`.
+
+    As there, faces that name a vertex twice and unreferenced vertices are left out.
+    """
+    V, F = as_mesh(V, F)
+    used, F = _referenced(F[~_is_repeated(F)], len(V))
+    X, unit = _unit_box(V[used])
+    corners, edges = _corner_geometry(X, F), _build_edges(X, F)
+    return Elements(
+        V[used],
+        F,
+        edges.lengths * unit,
+        corners.angle,
+        corners.area * unit * unit,
+        _radius_ratios(corners),
+    )
+
+
 class _Corners(NamedTuple):
     """Shape of the faces: squared edge lengths and angles by corner, areas by face."""
 
@@ -204,6 +234,10 @@ class _Edges(NamedTuple):
 
 def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
+
+
+def _is_repeated(F: IntArray) -> NDArray[np.bool_]:
+    return (F[:, 0] == F[:, 1]) | (F[:, 1] == F[:, 2]) | (F[:, 2] == F[:, 0])
 
 
 def _referenced(F: IntArray, n: int) -> tuple[NDArray[np.bool_], IntArray]:

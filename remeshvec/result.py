@@ -59,6 +59,30 @@ class RemeshResult:
     def __iter__(self) -> Iterator[NDArray[Any]]:
         return iter((self.V, self.F))
 
+    def show(self, *, title: str = "", up: str = "y") -> None:
+        """Show a page with both meshes, histograms and measures (the extra ``[html]``).
+
+        In a Jupyter notebook it appears below the cell, about 5 MB of output; elsewhere it opens in
+        the browser, from a file in the folder for temporary files.
+
+        Parameters
+        ----------
+        title : str
+            Heading, such as the name of the mesh.
+        up : {"y", "z"}
+            Axis that points up in the first view.
+
+        Raises
+        ------
+        PlotlyMissingError
+            Plotly is not installed.
+        OptionError
+            `up` is no such axis.
+        """
+        import remeshvec  # not the page's module: results know nothing of what shows them
+
+        remeshvec.show_html(self, title=title, up=up)
+
     # -- where things lie -------------------------------------------------------------------
 
     @property

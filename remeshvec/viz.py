@@ -18,7 +18,14 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import RemeshvecError
 from .mesh_files import check_writable, write_file
 
-__all__ = ["PICTURE_SUFFIXES", "ViewerMissingError", "picture", "require_viewer", "show"]
+__all__ = [
+    "PICTURE_SUFFIXES",
+    "ViewerMissingError",
+    "picture",
+    "require_viewer",
+    "show",
+    "three_quarter_view",
+]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -167,7 +174,7 @@ def _plotter(
 ) -> Any:
     """Set the scene: two meshes, one camera for both."""
     meshes = [_as_arrays(mesh) for mesh in (before, after)]
-    camera = _camera(*meshes[0], UP[up])
+    camera = three_quarter_view(*meshes[0], UP[up])
     frame = _frame(np.concatenate([V[F].reshape(-1, 3) for V, F in meshes]), camera, width)
     plotter = pyvista.Plotter(
         shape=(1, 2), border=False, window_size=list(frame.pixels), off_screen=off_screen
@@ -222,7 +229,7 @@ def _aim(plotter: Any, camera: Camera) -> None:
     plotter.reset_camera_clipping_range()
 
 
-def _camera(V: FloatArray, F: IntArray, axes: FloatArray) -> Camera:
+def three_quarter_view(V: FloatArray, F: IntArray, axes: FloatArray) -> Camera:
     """Choose a three-quarter view on the side that shows most area.
 
     The rows of `axes` are the directions to the right, up, and to the front of the object.

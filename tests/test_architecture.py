@@ -38,7 +38,7 @@ LEVELS = {
     7: [
         "evolver", "evolver.energies", "evolver.problem", "evolver.minimize",
         "evolver.necks", "evolver.evolve", "evolver.errors", "evolver.surface_evolver",
-        "viz", "_arguments", "_array_files", "cli",
+        "viz", "html_page", "_page_views", "_page_charts", "_arguments", "_array_files", "cli",
     ],
     8: ["__main__"],
 }  # fmt: skip
@@ -82,7 +82,8 @@ SIDEWAYS = {
     ("evolver.necks", "evolver.energies"),
     *(("evolver.surface_evolver", f"evolver.{name}") for name in ("errors", "minimize", "problem")),
     *(("evolver.evolve", f"evolver.{name}") for name in ("energies", "minimize", "necks", "problem")),
-    ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"),
+    ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"), ("cli", "html_page"),
+    ("html_page", "_page_charts"), ("html_page", "_page_views"), ("_page_views", "viz"),
 }  # fmt: skip
 LEVEL = {name: level for level, names in LEVELS.items() for name in names}
 
@@ -220,7 +221,17 @@ def test_import_is_light():
     loaded = set(python("import remeshvec, sys; print(*sys.modules)"))
     # Numba itself imports the package scipy, to see that it is there, but none of its parts.
     parts = {"scipy.sparse", "scipy.spatial", "scipy.linalg", "scipy.special", "scipy.stats"}
-    others = {"igl", "trimesh", "pyvista", "meshio", "plyfile", "matplotlib", "pytest", "vtk"}
+    others = {
+        "igl",
+        "trimesh",
+        "pyvista",
+        "meshio",
+        "plyfile",
+        "matplotlib",
+        "pytest",
+        "vtk",
+        "plotly",
+    }
     assert not (parts | others) & loaded
     assert {"numba", "numpy", "remeshvec.remesh"} <= loaded
 
