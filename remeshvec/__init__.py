@@ -16,7 +16,8 @@ from .errors import (
 from .mesh_files import MeshFile, read_mesh, write_mesh
 from .quality import Quality, quality
 from .remesh import remesh
-from .report import RemeshResult, Report
+from .report import Report
+from .result import RemeshResult
 from .sizing import Adaptive
 
 if TYPE_CHECKING:

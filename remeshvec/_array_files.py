@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .errors import MeshFormatError
 from .mesh_files import write_file
-from .report import RemeshResult
+from .result import RemeshResult
 
 __all__ = ["read_array", "write_arrays"]
 

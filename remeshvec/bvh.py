@@ -23,6 +23,7 @@ __all__ = [
     "build_tree",
     "closest_face",
     "closest_faces",
+    "closest_points",
     "point_on_face",
     "search_face",
     "walk_to_face",
@@ -57,6 +58,10 @@ class Surface:
         self.origin = origin
         self.twin = twin
         self.parallel = parallel
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave the tree out of pickles: it is larger than all else, and soon built."""
+        return {name: value for name, value in vars(self).items() if name != "tree"}
 
     @cached_property
     def tree(self) -> Tree:
@@ -297,20 +302,41 @@ def closest_faces(
     face : (k,) int32
     distance : (k,) float64
     """
-    face = np.empty(len(points), np.int32)
-    distance = np.empty(len(points))
-    _closest_faces(parallel, tree, points, hint, trust * trust, face, distance)
+    face, _, distance = _look_up(tree, points, hint, trust, parallel)
     return face, np.sqrt(distance)
 
 
+def closest_points(
+    tree: Tree, points: FloatArray, hint: IndexArray, trust: float, parallel: bool
+) -> tuple[IndexArray, FloatArray]:
+    """Find the closest face of many points, and where on it; see `closest_faces`.
+
+    Returns
+    -------
+    face : (k,) int32
+    barycentric : (k, 3) float64
+    """
+    face, weights, _ = _look_up(tree, points, hint, trust, parallel)
+    return face, np.column_stack([1.0 - weights.sum(axis=1), weights])
+
+
+def _look_up(
+    tree: Tree, points: FloatArray, hint: IndexArray, trust: float, parallel: bool
+) -> tuple[IndexArray, FloatArray, FloatArray]:
+    face, distance = np.empty(len(points), np.int32), np.empty(len(points))
+    weights = np.empty((len(points), 2))
+    _closest_faces(parallel, tree, points, hint, trust * trust, face, weights, distance)
+    return face, weights, distance
+
+
 @threaded(lambda tree, points, *_: -(-len(points) // _POINTS))
-def _closest_faces(span, tree, points, hint, trust, face, distance):
+def _closest_faces(span, tree, points, hint, trust, face, weights, distance):
     for k in range(span[0], span[1]):
         stack = np.empty((2, STACK), np.int64)
         last = np.int64(0)
         for i in range(_POINTS * k, min(_POINTS * k + _POINTS, points.shape[0])):
             start = last if hint[i] == NONE else np.int64(hint[i])
-            last, _, _, distance[i] = closest_face(
+            last, weights[i, 0], weights[i, 1], distance[i] = closest_face(
                 tree, points[i, 0], points[i, 1], points[i, 2], start, trust, stack
             )
             face[i] = last

@@ -27,7 +27,7 @@ from .mesh_files import (
     write_mesh,
 )
 from .quality import quality, side_by_side
-from .report import RemeshResult
+from .result import RemeshResult
 from .sizing import Adaptive
 
 __all__ = ["main"]

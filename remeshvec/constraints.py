@@ -20,6 +20,10 @@ BOUNDARY_MODES = ("free", "split", "fixed")
 
 BoolArray = NDArray[np.bool_]
 
+# Data on corners that differ by less than this share of their range are equal: single precision has
+# 6e-8, and texture coordinates of one vertex are often computed once for every face.
+_NEAR = 1e-6
+
 
 class Marks(NamedTuple):
     """What must stay, on a mesh."""
@@ -40,7 +44,9 @@ class Constraints:
     fixed_vertices: NDArray[np.int64]  # (k,)
     fixed_faces: BoolArray | None  # (m,)
     labels: NDArray[Any] | None  # (m,)
+    on_corners: list[NDArray[Any]]  # (m, 3, k) each, or (m, 1, k): whose jumps are kept
     unselected: BoolArray | None  # (m,) those of the fixed faces that are to come first, in order
+    F: NDArray[np.int64]  # (m, 3)
 
     def on_mesh(
         self, mesh: Mesh, vertex_source: IndexArray, face_source: NDArray[np.intp], same: Any
@@ -63,6 +69,8 @@ class Constraints:
             hard[_sides(mesh.origin, vertex_source, edges.T)] = True
         if self.labels is not None:
             hard |= _borders(mesh.twin, self.labels[face_source])
+        if self.on_corners:
+            hard |= self._jumps(mesh, vertex_source, face_source, same)
         fixed = np.zeros(len(vertex_source), np.bool_)
         if len(vertices):
             fixed = np.isin(vertex_source, vertices)
@@ -83,6 +91,35 @@ class Constraints:
             frozen[h] = True
             fixed[ends_of(mesh.origin, h)] = True
         return Marks(hard, held, frozen, fixed)
+
+    def _jumps(
+        self, mesh: Mesh, vertex_source: IndexArray, face_source: NDArray[np.intp], same: Any
+    ) -> BoolArray:
+        """Half-edges across which the data on corners differ, at one end or both."""
+        h = np.flatnonzero(mesh.twin > np.arange(len(mesh.twin)))
+        pairs = []
+        for v, ours, theirs in (
+            (mesh.origin[h], h // 3, mesh.twin[h] // 3),
+            (ends_of(mesh.origin, h)[1], h // 3, mesh.twin[h] // 3),
+        ):
+            places = []
+            for face in (face_source[ours], face_source[theirs]):
+                corners = self.F[face] if same is None else same[self.F[face]]
+                places.append((face, (corners == vertex_source[v][:, None]).argmax(axis=1)))
+            pairs.append(places)
+        is_jump = np.zeros(len(h), np.bool_)
+        for values in self.on_corners:
+            last = values.shape[1] - 1
+            near = 0.0 if values.dtype.kind not in "fc" else _NEAR * np.ptp(values, axis=(0, 1))
+            for (f, c), (g, d) in pairs:
+                one, other = values[f, np.minimum(c, last)], values[g, np.minimum(d, last)]
+                if values.dtype.kind in "fc":
+                    is_jump |= (abs(one - other) > near).any(axis=1)
+                else:
+                    is_jump |= (one != other).any(axis=1)
+        jumps = np.zeros(len(mesh.twin), np.bool_)
+        jumps[h[is_jump]] = jumps[mesh.twin[h[is_jump]]] = True
+        return jumps
 
 
 def _sides(
@@ -133,6 +170,7 @@ def make_constraints(
     fixed_vertices: Any = None,
     fixed_faces: Any = None,
     face_labels: Any = None,
+    preserve: Any = None,
     selection: Any = None,
 ) -> Constraints:
     """Check the caller's wishes against a mesh of ``n`` vertices and faces ``F``.
@@ -165,8 +203,33 @@ def make_constraints(
         else as_indices(fixed_vertices, n, "fixed_vertices", "vertex"),
         fixed,
         labels,
+        _corner_data(preserve, len(F)),
         unselected,
+        F,
     )
+
+
+def _corner_data(preserve: Any, m: int) -> list[NDArray[Any]]:
+    """Return arrays (m, 3, k), or (m, 1, k) for data on faces."""
+    if preserve is None:
+        return []
+    several = preserve if isinstance(preserve, list | tuple) else [preserve]
+    arrays = []
+    for i, given in enumerate(several):
+        name = f"preserve[{i}]" if len(several) > 1 else "preserve"
+        array = as_array(given, name)
+        if array.ndim == 1 and len(array) == m:
+            arrays.append(array.reshape(m, 1, 1))
+        elif array.ndim >= 2 and array.shape[:2] == (m, 3):
+            arrays.append(array.reshape(m, 3, -1))
+        else:
+            raise OptionError(
+                f"{name} must hold one entry a corner, shape ({m}, 3, ...), or one a face, shape "
+                f"({m},); got {array.shape}"
+            )
+        if array.dtype.kind in "fc" and not np.isfinite(array).all():
+            raise OptionError(f"{name} holds NaN or infinity, which have no jumps")
+    return arrays
 
 
 def _angle(value: Any) -> float | str | None:

@@ -23,7 +23,9 @@ from .halfedge import ends_of
 from .operations.project import Reference, locate_vertices
 from .order import even_ranges, per_range
 from .prepare import Prepared
+from .provenance import Births, Provenance
 from .reference import Built
+from .report import Late
 from .seams import seam_vertices
 
 __all__ = ["Output", "extract", "locate"]
@@ -42,7 +44,7 @@ class Output:
     V: NDArray[Any]
     F: NDArray[Any]
     face_labels: NDArray[Any] | None
-    births: Callable[[], tuple[IntArray, FloatArray]]
+    provenance: Provenance
     vertex_map: Callable[[], IntArray]
     face_map: Callable[[], IntArray]
     feature_edges: Callable[[], IntArray]
@@ -100,7 +102,7 @@ def extract(
     if numbers.new.size:
         fixed, ends = numbers.new[fixed].astype(np.int64), numbers.new[ends]
     points[fixed] = V[born_at]
-    labels, face_map = None, (np.empty(0, np.int64), np.empty(0, np.int64))
+    order, labels, face_map = None, None, (np.empty(0, np.int64), np.empty(0, np.int64))
     if built.held is not None or constraints.labels is not None:
         born_in = mesh.source[numbers.faces] if numbers.faces.size else mesh.source
         source = prepared.face_source[born_in]
@@ -113,17 +115,22 @@ def extract(
             face_map = source[held], np.flatnonzero(held)
         if constraints.labels is not None:
             labels = constraints.labels[source]
-    if barycentric is None:
-        trust = _TRUST * prepared.scale * float(lengths.mean())
-        vertices, blocks = _vertices_of(mesh), make_blocks(mesh)
-        where = partial(_locate_late, vertices, blocks, built.reference, trust, threads)
-    else:
-        where = partial(_known, mesh.birth, barycentric)
+    rows = numbers.faces if numbers.faces.size else np.arange(len(F), dtype=np.int32)
     return Output(
         points,
         F,
         labels,
-        partial(_births, where, numbers.kept, prepared.face_source, prepared.flipped),
+        _provenance(
+            mesh,
+            barycentric,
+            rows if order is None else rows[order],
+            numbers.kept,
+            prepared,
+            built,
+            len(V),
+            _TRUST * prepared.scale * float(lengths.mean()),
+            threads,
+        ),
         partial(_spread, len(V), born_at, fixed, prepared.same),
         partial(_spread, n_faces, *face_map),
         partial(_feature_edges, ends),
@@ -258,30 +265,49 @@ def _curve_ends(mesh: Mesh, built: Built) -> NDArray[Any]:
 # -- what is left until asked for -------------------------------------------------------------
 
 
-def _births(
-    where: Callable[[], tuple[IndexArray, FloatArray]],
+def _provenance(
+    mesh: Mesh,
+    barycentric: FloatArray | None,
+    rows: IndexArray,
     kept: IndexArray,
-    face_source: NDArray[Any],
-    flipped: NDArray[np.bool_] | None,
-) -> tuple[IntArray, FloatArray]:
-    """Faces of the input, and weights of their corners, from those of the reference."""
-    birth, barycentric = where()
-    if kept.size:
-        birth, barycentric = birth[kept], barycentric[kept]
-    face = face_source[birth // 3].astype(np.int64)
-    if flipped is not None:
-        is_flipped = flipped[face]
-        barycentric[is_flipped] = barycentric[is_flipped][:, [0, 2, 1]]
-    return face, barycentric
+    prepared: Prepared,
+    built: Built,
+    n_in: int,
+    trust: float,
+    threads: int,
+) -> Provenance:
+    """Keep what tells later where things lie on the input."""
+    reference = built.reference._replace(arcs=np.empty((3, 0)))
+    if barycentric is None:
+        vertices, blocks = _vertices_of(mesh), make_blocks(mesh)
+        where = Late(partial(_locate_late, vertices, blocks, reference, trust, threads))
+    else:
+        where = Late(partial(_known, mesh.birth, barycentric))
+    return Provenance(
+        mesh._replace(valence_excess=_NOTHING, vertex_halfedge=_NOTHING),
+        where,
+        rows,
+        kept,
+        reference,
+        built.features,
+        built.names,
+        prepared.face_source,
+        prepared.vertex_source,
+        prepared.flipped,
+        prepared.same,
+        n_in,
+        trust,
+        threads,
+    )
 
 
-def _known(birth: IndexArray, barycentric: FloatArray) -> tuple[IndexArray, FloatArray]:
+def _known(birth: IndexArray, barycentric: FloatArray) -> Births:
     return birth, barycentric
 
 
 def _locate_late(
     vertices: Mesh, blocks: Blocks, reference: Reference, trust: float, threads: int
-) -> tuple[IndexArray, FloatArray]:
+) -> Births:
     """Look for vertices that were not projected, after the call that made them."""
     with compile_notice(), thread_scope(threads) as may_run:
         reference.surface.parallel = may_run

@@ -35,6 +35,7 @@ class Built(NamedTuple):
     on_seam: BoolArray | None  # (n,) vertices of the reference where sheets meet; None for none
     held: BoolArray | None  # (m,) faces of the reference that stay; None for none
     features: IndexArray  # half-edges of the reference on features
+    names: IndexArray  # of their edges, see `polyline.name_edges`
     counts: dict[str, int]  # of features
 
     @property
@@ -82,6 +83,7 @@ def build_reference(
         on_seam[ends_of(origin, members)] = True
         fixed |= _junctions(origin, curves.edges, mesh.curve, vertex_source, on_seam)
         fixed = _agree(fixed, vertex_source, on_seam)
+    feature_names = mesh.curve[curves.edges]
     counts["corners"] = int(np.count_nonzero(fixed & (curves.degree > 0)))
     beside = join_edges(mesh.curve, curves, origin, fixed)
     _mark(mesh, curves.edges, fixed)
@@ -95,7 +97,7 @@ def build_reference(
     twin[curves.edges] = NONE
     reference = Reference(Surface(X, origin, twin, parallel), X, origin, beside, arcs)
     _lengthen_beside(mesh, vertex_source, marks.frozen)
-    return Built(reference, on_seam, marks.held, curves.edges, counts)
+    return Built(reference, on_seam, marks.held, curves.edges, feature_names, counts)
 
 
 def _lengthen_beside(mesh: Mesh, vertex_source: IndexArray, frozen: BoolArray) -> None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import sqrt
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,33 +12,21 @@ from numpy.typing import ArrayLike
 from ._check import as_mesh, positive_count
 from ._jit import compile_notice
 from ._threads import thread_scope
-from ._types import DEAD, FloatArray, Mesh
-from .constraints import Constraints, make_constraints
+from .constraints import make_constraints
 from .errors import OptionError
 from .extract import extract, locate
-from .lengths import (
-    adaptive_limits,
-    check_gradation,
-    limited_lengths,
-    measure,
-    set_lengths,
-)
+from .job import Job, Lengths, Sizing, meet_count
+from .lengths import check_gradation
 from .options import make_options
-from .prepare import Prepared, prepare
-from .reference import Built, build_reference
-from .report import Late, RemeshResult, Report, Stopwatch
-from .sizing import Adaptive
+from .prepare import prepare
+from .provenance import corner_births, face_births, images, vertex_births
+from .report import Late, Postponed, Report, Stopwatch
+from .result import RemeshResult
 from .sweeps import Callback, Sweeps
 
 __all__ = ["remesh"]
 
 MAX_FACES = 50_000_000
-
-# Tries to meet a number of faces or vertices, and how near is near enough.
-_TRIES = 8
-_NEAR = 0.02
-
-Lengths = float | ArrayLike | Callable[[FloatArray], ArrayLike] | Adaptive
 
 
 def remesh(
@@ -62,6 +49,7 @@ def remesh(
     fixed_vertices: ArrayLike | None = None,
     fixed_faces: ArrayLike | None = None,
     face_labels: ArrayLike | None = None,
+    preserve: ArrayLike | Sequence[ArrayLike] | None = None,
     selection: ArrayLike | None = None,
     boundary: str = "free",
     gradation: float = 1.5,
@@ -128,6 +116,10 @@ def remesh(
         Input faces that stay, bit for bit; ``face_map`` tells where they went.
     face_labels : (m,) int, optional
         Borders between labels are kept as creases, and every new face gets its label.
+    preserve : (m, 3, ...) or (m,) array, or a list of such arrays, optional
+        Data on corners of faces, as texture coordinates are, or on faces. Edges across which they differ
+        are kept as creases, so that no new face mixes two charts; `RemeshResult.transfer` brings them
+        over. Numbers that differ by less than 1e-6 of their range count as equal.
     selection : (k,) int or (m,) bool, optional
         Input faces to remesh. All others stay, and come first in the result, in their order.
     boundary : {"free", "split", "fixed"}
@@ -198,15 +190,16 @@ def remesh(
             fixed_vertices=fixed_vertices,
             fixed_faces=fixed_faces,
             face_labels=face_labels,
+            preserve=preserve,
             selection=selection,
         )
     with compile_notice(), thread_scope(options.threads) as may_run:
         sweeps = Sweeps(options, watch, may_run, callback)
         with watch.time("build"):
             prepared = prepare(vertices, faces, sweeps.is_parallel(len(faces)))
-        job = _Job(prepared, constraints, vertices, sizing, sweeps)
+        job = Job(prepared, constraints, vertices, sizing, sweeps)
         del prepared  # it holds the mesh of the input
-        done = job.run_once() if count is None else _meet_count(job, *count)
+        done = job.run_once() if count is None else meet_count(job, *count)
         parallel = sweeps.is_parallel(len(done.mesh.origin) // 3)
         barycentric = None
         if options.project or options.fit_rounds:
@@ -232,105 +225,13 @@ def remesh(
         done.built.counts, sweeps.deviation, before=(V, F), after=(V2, out.F),
     )  # fmt: skip
     return RemeshResult(
-        V2, out.F, report, out.face_labels, out.lengths, Late(out.births), Late(out.vertex_map),
-        Late(out.face_map), Late(out.feature_edges), Late(out.corners),
+        V2, out.F, report, out.face_labels, out.lengths,
+        Late(partial(vertex_births, out.provenance)),
+        Postponed(partial(face_births, out.provenance)),
+        Postponed(partial(corner_births, out.provenance)),
+        Postponed(partial(images, out.provenance)),
+        Late(out.vertex_map), Late(out.face_map), Late(out.feature_edges), Late(out.corners),
     )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Sizing:
-    """What the caller says about sizes, checked as far as it can be without the mesh."""
-
-    L: Lengths | None
-    gradation: float
-    max_faces: int
-
-
-@dataclass(frozen=True)
-class _Done:
-    """A remeshed surface in the frame of `Prepared`."""
-
-    mesh: Mesh
-    is_compact: bool
-    built: Built
-    length: float  # of the mean new edge, in the units of the input
-
-    def count(self, noun: str) -> int:
-        """Count faces or vertices."""
-        alive = self.mesh.origin[::3] if noun == "faces" else self.mesh.vertex_halfedge
-        return int(np.count_nonzero(alive != DEAD))
-
-    def count_held(self) -> int:
-        """Count faces that had to stay."""
-        return 0 if self.built.held is None else int(self.built.held.sum())
-
-
-class _Job:
-    """One prepared mesh, to be remeshed with one length or several."""
-
-    def __init__(
-        self,
-        prepared: Prepared,
-        constraints: Constraints,
-        V: FloatArray,
-        sizing: Sizing,
-        sweeps: Sweeps,
-    ) -> None:
-        self.prepared = prepared
-        self.constraints = constraints
-        self.V = V
-        self.sizing = sizing
-        self.sweeps = sweeps
-        self.parallel = sweeps.is_parallel(len(prepared.mesh.origin) // 3)
-        with sweeps.watch.time("reference"):
-            self.measures = measure(prepared, self.parallel)
-        sweeps.scale = prepared.scale
-        sweeps.gradation = sizing.gradation
-        if isinstance(sizing.L, Adaptive):
-            sweeps.tolerance = sizing.L.tolerance * prepared.scale
-            sweeps.shortest = adaptive_limits(prepared, sizing.L)[0]
-            sweeps.limit_lengths = lambda x: limited_lengths(prepared, x, sizing.gradation)
-
-    def run_once(self) -> _Done:
-        """Remesh, and let go of the prepared mesh; lengths from the curvature need it again."""
-        if isinstance(self.sizing.L, Adaptive):
-            return self.run(None)
-        meshes = [self.prepared.mesh]
-        nothing = Mesh(*(array[:0].copy() for array in meshes[0]))  # type: ignore[arg-type]
-        self.prepared = self.prepared._replace(mesh=nothing)
-        return self._sweep(meshes, self.sizing.L)
-
-    def run(self, L: Lengths | None) -> _Done:
-        """Remesh a copy of the mesh."""
-        return self._sweep([self.prepared.mesh.copy()], self.sizing.L if L is None else L)
-
-    def _sweep(self, meshes: list[Mesh], L: Lengths | None) -> _Done:
-        """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
-        with self.sweeps.watch.time("reference"):
-            built, length = self._look_back(meshes[0], L)
-        mesh = self.sweeps.run(meshes.pop(), built)
-        is_compact = self.sweeps.has_more(built)
-        mesh = self.sweeps.finish(mesh, built) if is_compact else mesh
-        return _Done(mesh, is_compact, built, length / self.prepared.scale)
-
-    def _look_back(self, mesh: Mesh, L: Lengths | None) -> tuple[Built, float]:
-        """Set the lengths of a mesh, mark its features, build the reference."""
-        prepared, constraints = self.prepared._replace(mesh=mesh), self.constraints
-        source, angle = prepared.vertex_source, constraints.feature_angle
-        marks = constraints.on_mesh(mesh, source, prepared.face_source, prepared.same)
-        length = set_lengths(
-            prepared,
-            self.measures,
-            self.V,
-            L,
-            marks,
-            angle,
-            self.sizing.gradation,
-            self.sizing.max_faces,
-            self.sweeps.options.max_deviation,
-        )
-        mean_edge = self.measures.mean_edge
-        return build_reference(mesh, source, angle, marks, mean_edge, self.parallel), length
 
 
 def _wanted_count(L: Any, n_faces: Any, n_vertices: Any) -> tuple[str, int] | None:
@@ -342,31 +243,6 @@ def _wanted_count(L: Any, n_faces: Any, n_vertices: Any) -> tuple[str, int] | No
     if n_faces is not None:
         return "faces", positive_count(n_faces, "n_faces")
     return None if n_vertices is None else ("vertices", positive_count(n_vertices, "n_vertices"))
-
-
-def _meet_count(job: _Job, noun: str, wanted: int) -> _Done:
-    """Remesh with one length after another until the count is met within 2 %."""
-    faces = wanted if noun == "faces" else 2 * wanted
-    if faces > job.sizing.max_faces:
-        raise OptionError(
-            f"n_{noun} = {wanted:,} is more than max_faces = {job.sizing.max_faces:,}"
-        )
-    L = sqrt(job.measures.area / faces / (sqrt(3.0) / 4.0)) / job.prepared.scale
-    best = None
-    for _ in range(_TRIES):
-        done = job.run(L)
-        count = done.count(noun)
-        if best is None or abs(count - wanted) < abs(best.count(noun) - wanted):
-            best = done
-        held = done.count_held() // (1 if noun == "faces" else 2)
-        if abs(count - wanted) <= _NEAR * wanted or job.sweeps.stop == "cancelled":
-            break
-        L *= min(2.0, max(0.5, sqrt(max(count - held, 1) / max(wanted - held, 1))))
-    assert best is not None
-    count = best.count(noun)
-    if abs(count - wanted) > _NEAR * wanted:
-        job.sweeps.stop += f"; {count:,} {noun} are as near to {wanted:,} as {_TRIES} tries came"
-    return best
 
 
 def _vertex_dtype(V: ArrayLike) -> np.dtype[Any]:

@@ -1,25 +1,22 @@
-"""What a call returns: the mesh, where its vertices come from, and the report."""
+"""What happened in a call: options, counts, seconds, quality; and values that are made when asked for."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from time import perf_counter
 from typing import Any, Generic, TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .options import Options
 from .quality import Quality, quality
 
-__all__ = ["Late", "RemeshResult", "Report", "Stopwatch"]
+__all__ = ["Late", "Postponed", "Report", "Stopwatch"]
 
 T = TypeVar("T")
-
-Births = tuple[NDArray[np.int64], NDArray[np.float64]]
 
 
 class Late(Generic[T]):
@@ -46,6 +43,15 @@ class Late(Generic[T]):
 
 def _known(value: T) -> Late[T]:
     return Late(lambda: value)
+
+
+class Postponed(Late[T]):
+    """The same, but a pickle or a copy takes along what it is made of: that is smaller, or sooner done."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        with self._lock:
+            make = self._make
+        return (_known, (self._value,)) if make is None else (Postponed, (make,))
 
 
 class _Lap:
@@ -150,73 +156,3 @@ class Report:
             "quality_before": self.quality_before.to_dict(),
             "quality_after": self.quality_after.to_dict(),
         }
-
-
-@dataclass
-class RemeshResult:
-    """A remeshed surface; unpacks as ``V, F = result``.
-
-    What few callers read is computed when it is first asked for, or when the result is copied or
-    pickled. Until then births of vertices that were not projected hold the input's faces in memory.
-
-    Attributes
-    ----------
-    V : (n, 3)
-        Vertices, in the dtype of the input (float64 for integers).
-    F : (m, 3)
-        Faces, in the dtype of the input.
-    report : Report
-    face_labels : (m,) int, or None
-        Label of every face, where the input had labels.
-    lengths : (n,) float64
-        Target edge length at every vertex.
-    """
-
-    V: NDArray[Any]
-    F: NDArray[Any]
-    report: Report
-    face_labels: NDArray[Any] | None
-    lengths: NDArray[np.float64]
-    _births: Late[Births] = field(repr=False, compare=False)
-    _vertex_map: Late[NDArray[np.int64]] = field(repr=False, compare=False)
-    _face_map: Late[NDArray[np.int64]] = field(repr=False, compare=False)
-    _feature_edges: Late[NDArray[np.int64]] = field(repr=False, compare=False)
-    _corners: Late[NDArray[np.int64]] = field(repr=False, compare=False)
-
-    def __iter__(self) -> Iterator[NDArray[Any]]:
-        return iter((self.V, self.F))
-
-    @property
-    def birth_face(self) -> NDArray[np.int64]:
-        """Input face on which each vertex lies, (n,)."""
-        return self._births()[0]
-
-    @property
-    def birth_barycentric(self) -> NDArray[np.float64]:
-        """Where on its birth face each vertex lies, (n, 3).
-
-        ``V = sum(birth_barycentric[:, i] * V_in[F_in[birth_face, i]])`` for vertices that lie on the
-        input; otherwise that is the point of the input closest to the vertex, among those that a walk
-        over the input sees where it ends within 0.05 L.
-        """
-        return self._births()[1]
-
-    @property
-    def vertex_map(self) -> NDArray[np.int64]:
-        """For every input vertex the output vertex that is the same, bit for bit; -1 for none."""
-        return self._vertex_map()
-
-    @property
-    def face_map(self) -> NDArray[np.int64]:
-        """For every input face that had to stay the output face; -1 for the others."""
-        return self._face_map()
-
-    @property
-    def feature_edges(self) -> NDArray[np.int64]:
-        """Edges on creases, boundaries, borders of labels, and where sheets meet, (k, 2)."""
-        return self._feature_edges()
-
-    @property
-    def corners(self) -> NDArray[np.int64]:
-        """Vertices that did not move, (k,)."""
-        return self._corners()

@@ -28,7 +28,7 @@ LEVELS = {
     ],
     5: [
         "options", "constraints", "prepare", "lengths", "reference", "seams", "deviation",
-        "report", "sweeps", "extract", "remesh",
+        "report", "sweeps", "provenance", "extract", "transfer", "result", "job", "remesh",
     ],
     6: [
         "laplacians", "solver", "motion", "fairing", "editing", "multiresolution", "smoothing",
@@ -60,9 +60,14 @@ SIDEWAYS = {
     *(("sweeps", name) for name in (
         "options", "lengths", "reference", "seams", "deviation", "report",
     )),
-    *(("extract", name) for name in ("constraints", "prepare", "reference", "seams")),
+    ("provenance", "report"), ("result", "report"), ("result", "transfer"),
+    *(("extract", name) for name in (
+        "constraints", "prepare", "provenance", "reference", "report", "seams",
+    )),
+    *(("job", name) for name in ("constraints", "prepare", "lengths", "reference", "sweeps")),
     *(("remesh", name) for name in (
-        "options", "constraints", "prepare", "lengths", "reference", "sweeps", "extract", "report",
+        "options", "constraints", "prepare", "lengths", "provenance", "sweeps", "extract", "job",
+        "report", "result",
     )),
     ("fairing", "laplacians"), ("fairing", "solver"),
     ("editing", "fairing"), ("editing", "laplacians"),
