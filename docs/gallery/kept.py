@@ -79,6 +79,28 @@ def face_labels() -> Picture:
     return side_by_side(panels, SHEET)
 
 
+def preserve() -> Picture:
+    """Keep the seams of texture coordinates; the stripe of a texture at every face's middle."""
+    V, F, uv = torus()
+    panels = []
+    for given, caption in ((None, "preserve=None"), (uv, "preserve=uv")):
+        result = remesh(V, F, 0.28, preserve=given)
+        middles = result.transfer(uv, on="corners").mean(axis=1)
+        panels.append(panel(caption, result, by_label((5 * middles[:, 0]).astype(int))))
+    return side_by_side(panels, (75.0, 40.0))
+
+
+def torus(nu: int = 60, nv: int = 24) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Torus with texture coordinates (m, 3, 2) from 0 to 1 around it, that jump at two seams."""
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(nu), np.arange(nv), indexing="ij"))
+    corners = np.stack([[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]])
+    places = np.concatenate([corners[[0, 1, 2]], corners[[0, 2, 3]]], axis=2).transpose(2, 0, 1)
+    a, b = 2 * np.pi * i / nu, 2 * np.pi * j / nv
+    r = 2.0 + 0.8 * np.cos(b)
+    V = np.stack([r * np.cos(a), r * np.sin(a), 0.8 * np.sin(b)], axis=1)
+    return V, places[..., 0] % nu * nv + places[..., 1] % nv, places / [nu, nv]
+
+
 def selection() -> Picture:
     """Only a part is remeshed."""
     V, F = mesh("creature")
@@ -117,5 +139,5 @@ def shortest_path(V: FloatArray, F: IntArray, start: int, end: int) -> IntArray:
 
 
 PICTURES = (
-    feature_angle, feature_edges, fixed_vertices, fixed_faces, face_labels, selection, boundary,
+    feature_angle, feature_edges, fixed_vertices, fixed_faces, face_labels, preserve, selection, boundary,
 )  # fmt: skip
