@@ -22,6 +22,7 @@ exclude_patterns = ["_build", "gallery"]
 html_theme = "furo"
 html_title = "remeshvec"
 html_show_copyright = False
+smartquotes = False  # two hyphens begin a flag
 
 # Pages are Markdown that GitHub shows too: links between them name files, headings are anchors.
 myst_heading_anchors = 3
