@@ -136,9 +136,9 @@ def as_indices(value: Any, count: int, name: str, noun: str) -> NDArray[np.int64
 
 
 def as_array(value: Any, name: str) -> NDArray[Any]:
-    """Check that an option is an array of numbers."""
+    """Check that an option is an array of numbers, or a tensor."""
     try:
-        array = np.asarray(value)
+        array = np.asarray(value.detach().cpu() if hasattr(value, "detach") else value)
     except (ValueError, TypeError) as error:
         raise OptionError(f"{name} is no rectangular array: {error}") from error
     if array.dtype == object:

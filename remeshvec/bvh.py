@@ -11,6 +11,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ._jit import inlined, kernel, threaded
 from ._types import NONE, FloatArray, IndexArray, Tree
@@ -24,8 +25,10 @@ __all__ = [
     "closest_face",
     "closest_faces",
     "closest_points",
+    "face_distance",
     "point_on_face",
     "search_face",
+    "walk_to",
     "walk_to_face",
 ]
 
@@ -318,6 +321,22 @@ def closest_points(
     """
     face, weights, _ = _look_up(tree, points, hint, trust, parallel)
     return face, np.column_stack([1.0 - weights.sum(axis=1), weights])
+
+
+def walk_to(
+    tree: Tree, points: FloatArray, start: NDArray[np.integer]
+) -> tuple[IndexArray, FloatArray, FloatArray]:
+    """Walk from a face to each point as near as walks lead, which cross no curve.
+
+    Returns
+    -------
+    face : (k,) int32
+    barycentric : (k, 3) float64
+    distance : (k,) float64
+        Squared.
+    """
+    face, weights, distance = _look_up(tree, points, start.astype(np.int32), np.inf, False)
+    return face, np.column_stack([1.0 - weights.sum(axis=1), weights]), distance
 
 
 def _look_up(

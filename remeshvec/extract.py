@@ -23,10 +23,10 @@ from .halfedge import ends_of
 from .operations.project import Reference, locate_vertices
 from .order import even_ranges, per_range
 from .prepare import Prepared
-from .provenance import Births, Provenance
 from .reference import Built
 from .report import Late
 from .seams import seam_vertices
+from .sides import Births, Provenance
 
 __all__ = ["Output", "extract", "locate"]
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from numbers import Real
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,22 +18,88 @@ from .errors import OptionError
 from .extract import extract, locate
 from .job import Job, Lengths, Sizing, meet_count
 from .lengths import check_gradation
+from .mesh_data import MeshData, carry
+from .objects import is_mesh_object, read_object
 from .options import make_options
 from .prepare import prepare
 from .provenance import corner_births, face_births, images, vertex_births
 from .report import Late, Postponed, Report, Stopwatch
 from .result import RemeshResult
+from .sizing import Adaptive
 from .sweeps import Callback, Sweeps
+from .transfer import is_tensor, like, to_numpy
 
-__all__ = ["remesh"]
+__all__ = ["RemeshOptions", "remesh"]
 
 MAX_FACES = 50_000_000
 
+M = TypeVar("M")
+
+
+class RemeshOptions(TypedDict, total=False):
+    """The keywords of `remesh`."""
+
+    preset: str
+    iterations: int | None
+    tol: float | None
+    split: float | Sequence[float] | None
+    collapse: float | Sequence[float] | None
+    foldover: float | None
+    sliver_check: bool | None
+    project: bool | None
+    untangle_angle: float | None
+    fit: bool | None
+    feature_angle: float | str | None
+    feature_edges: ArrayLike | None
+    fixed_vertices: ArrayLike | None
+    fixed_faces: ArrayLike | str | None
+    face_labels: ArrayLike | str | None
+    preserve: Any
+    selection: ArrayLike | str | None
+    boundary: str
+    gradation: float
+    n_faces: int | None
+    n_vertices: int | None
+    max_deviation: float | None
+    threads: int | None
+    max_faces: int
+    callback: Callback | None
+
+
+if TYPE_CHECKING:
+    from typing import Unpack
+
+
+@overload
+def remesh(
+    V: ArrayLike, F: ArrayLike, L: Lengths | None = None, **options: Unpack[RemeshOptions]
+) -> RemeshResult: ...
+
+
+@overload
+def remesh(
+    V: M,
+    F: Lengths | str | None = None,
+    L: Lengths | str | None = None,
+    *,
+    return_result: Literal[True],
+    **options: Unpack[RemeshOptions],
+) -> tuple[M, RemeshResult]: ...
+
+
+@overload
+def remesh(
+    V: M,
+    F: Lengths | str | None = None,
+    L: Lengths | str | None = None,
+    **options: Unpack[RemeshOptions],
+) -> M: ...
+
 
 def remesh(
-    V: ArrayLike,
-    F: ArrayLike,
-    L: Lengths | None = None,
+    V: Any,
+    F: Any = None,
+    L: Any = None,
     *,
     preset: str = "default",
     iterations: int | None = None,
@@ -47,10 +114,10 @@ def remesh(
     feature_angle: float | str | None = "auto",
     feature_edges: ArrayLike | None = None,
     fixed_vertices: ArrayLike | None = None,
-    fixed_faces: ArrayLike | None = None,
-    face_labels: ArrayLike | None = None,
-    preserve: ArrayLike | Sequence[ArrayLike] | None = None,
-    selection: ArrayLike | None = None,
+    fixed_faces: ArrayLike | str | None = None,
+    face_labels: ArrayLike | str | None = None,
+    preserve: Any = None,
+    selection: ArrayLike | str | None = None,
     boundary: str = "free",
     gradation: float = 1.5,
     n_faces: int | None = None,
@@ -59,7 +126,8 @@ def remesh(
     threads: int | None = None,
     max_faces: int = MAX_FACES,
     callback: Callback | None = None,
-) -> RemeshResult:
+    return_result: bool = False,
+) -> Any:
     """Remesh a surface to well-shaped triangles with edges of length ``L``.
 
     Every sweep splits long edges, collapses short ones, flips edges towards valence 6 and relaxes
@@ -69,8 +137,11 @@ def remesh(
 
     Parameters
     ----------
-    V : (n, 3) float or int
-        Vertices; any array-like, never modified.
+    V : (n, 3) float or int, or a mesh
+        Vertices; any array-like, never modified. Or a whole mesh, with ``L`` after it: a pair ``(V, F)``,
+        a ``trimesh.Trimesh``, ``pyvista.PolyData``, ``meshio.Mesh`` or ``open3d.geometry.TriangleMesh``.
+        Objects come back as objects of the same type, with colours, texture coordinates, fields and
+        groups; seams of textures and borders of groups are kept. Tensors of PyTorch come back as such.
     F : (m, 3) int
         Triangles as 0-based indices; any array-like, never modified. Boundaries, several components
         and any genus are welcome, edges of three faces and more too: sheets share their vertices on
@@ -78,7 +149,8 @@ def remesh(
         winding and pinched vertices are handled and listed in ``report.dirt``.
     L : float, (n,) array, callable or Adaptive, optional
         Target edge length in the units of ``V``: for all edges, at each input vertex, as a function of
-        points (k, 3), or from the curvature. 0.9 times the mean edge length by default.
+        points (k, 3), or from the curvature. 0.9 times the mean edge length by default. For objects, this
+        and the options that take data on faces may name data that the object carries.
     preset : {"default", "fast", "fine"}
         ``"default"``: twelve sweeps with loosening thresholds, vertices on the input. ``"fast"``: the
         published algorithm, five sweeps. ``"fine"``: sixteen sweeps and the fit.
@@ -141,11 +213,14 @@ def remesh(
     callback : callable, optional
         Called as ``callback(sweep, phase, count)`` after each phase; returning False ends the call
         with the mesh as it is then.
+    return_result : bool
+        With a mesh object, return a pair of the new object and the `RemeshResult`.
 
     Returns
     -------
     RemeshResult
-        Unpacks as ``V2, F2``; holds births, labels, features, maps and a report too.
+        Unpacks as ``V2, F2``; holds births, labels, features, maps and a report too, and transfers data.
+        For a mesh object an object of its type.
 
     Raises
     ------
@@ -158,6 +233,15 @@ def remesh(
     ----------
     Botsch and Kobbelt, A Remeshing Approach to Multiresolution Modeling, SGP 2004, section 4.
     """
+    given = {k: x for k, x in locals().items() if k not in ("V", "F", "L", "return_result")}
+    if not _are_arrays(V, F):
+        return _remesh_object(V, *_only_length(F, L), given, return_result)
+    if return_result:
+        raise OptionError("return_result goes with mesh objects; arrays give the result anyway")
+    if is_tensor(V) or is_tensor(F):
+        result = remesh(to_numpy(V), to_numpy(F), L, **given)
+        result.V, result.F = like(V, result.V), like(F, result.F)
+        return result
     watch = Stopwatch()
     options = make_options(
         preset,
@@ -232,6 +316,58 @@ def remesh(
         Postponed(partial(images, out.provenance)),
         Late(out.vertex_map), Late(out.face_map), Late(out.feature_edges), Late(out.corners),
     )  # fmt: skip
+
+
+def _are_arrays(V: Any, F: Any) -> bool:
+    """Tell two arrays from a mesh and, perhaps, a length."""
+    is_length = F is None or isinstance(F, Real | str | Adaptive) or callable(F)
+    is_pair = isinstance(V, tuple | list) and len(V) == 2
+    return not is_mesh_object(V) and not (is_length and (is_pair or not hasattr(V, "__array__")))
+
+
+def _only_length(F: Any, L: Any) -> tuple[Any]:
+    """Return the length, which may stand in the place of the faces."""
+    if F is not None and L is not None:
+        raise OptionError("a mesh object is followed by the length alone")
+    return (L if F is None else F,)
+
+
+def _remesh_object(mesh: Any, L: Any, options: Any, return_result: bool) -> Any:
+    """Remesh an object, and let the new one carry the same data."""
+    if isinstance(mesh, tuple | list) and len(mesh) == 2:
+        if return_result:
+            raise OptionError("return_result goes with mesh objects; arrays give the result anyway")
+        return remesh(mesh[0], mesh[1], L, **options)
+    data = read_object(mesh)
+    for name in ("fixed_faces", "face_labels", "selection"):
+        if isinstance(options[name], str):
+            options[name] = _named(data, options[name], name)
+    asked = options["preserve"]
+    several = asked if isinstance(asked, list | tuple) else [] if asked is None else [asked]
+    found = [_named(data, x, "preserve") if isinstance(x, str) else x for x in several]
+    options["preserve"] = [*data.preserved(), *found] or None
+    if isinstance(L, str):
+        if L not in data.on_vertices:
+            raise OptionError(f"there are no data {L!r} on vertices; {_names(data.on_vertices)}")
+        L = data.on_vertices[L]
+    result = remesh(data.V, data.F, L, **options)
+    assert data.wrap is not None
+    out = data.wrap(carry(data, result))
+    return (out, result) if return_result else out
+
+
+def _named(data: MeshData, name: str, option: str) -> Any:
+    known = {
+        **data.on_faces,
+        **(data.on_corners | data.on_vertices if option == "preserve" else {}),
+    }
+    if name not in known:
+        raise OptionError(f"{option}: there are no data {name!r}; {_names(known)}")
+    return data.find(name)
+
+
+def _names(data: dict[str, Any]) -> str:
+    return "there are " + ", ".join(map(repr, data)) if data else "the mesh carries none"
 
 
 def _wanted_count(L: Any, n_faces: Any, n_vertices: Any) -> tuple[str, int] | None:

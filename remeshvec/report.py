@@ -46,7 +46,7 @@ def _known(value: T) -> Late[T]:
 
 
 class Postponed(Late[T]):
-    """The same, but a pickle or a copy takes along what it is made of: that is smaller, or sooner done."""
+    """The same, but a pickle or a copy takes along what it is made of, which is sooner done."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         with self._lock:

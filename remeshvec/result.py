@@ -78,7 +78,7 @@ class RemeshResult:
 
     @property
     def face_birth(self) -> IntArray:
-        """Input face on which the centroid of each face lies, (m,): the closest between the same creases."""
+        """Input face closest to the centroid of each face, (m,), between the same creases."""
         return self._face_births()
 
     @property
@@ -96,7 +96,7 @@ class RemeshResult:
 
     @property
     def image_face(self) -> IntArray:
-        """Output face closest to each input vertex, between the same creases; -1 where no face uses it."""
+        """Output face closest to each input vertex, (n_in,); -1 for vertices that no face uses."""
         return self._images()[0]
 
     @property

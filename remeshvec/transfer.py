@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from .errors import OptionError
 
-__all__ = ["METHODS", "as_matrix", "as_values", "interpolate", "is_tensor", "pick", "to_numpy"]
+__all__ = [
+    "METHODS",
+    "as_matrix",
+    "as_values",
+    "interpolate",
+    "is_tensor",
+    "like",
+    "pick",
+    "to_numpy",
+]
 
 METHODS = ("auto", "linear", "nearest")
 
@@ -71,18 +80,16 @@ def interpolate(values: Any, index: IntArray, weights: FloatArray, method: str) 
 
 def pick(values: Any, index: IntArray) -> Any:
     """Take elements, -1 for none: NaN where the type has it, else 0."""
-    taken = values[_like(values, index)]
+    taken = values[like(values, index)]
     nowhere = np.flatnonzero(index < 0)
     if len(nowhere):
         taken = taken.clone() if is_tensor(taken) else taken.copy()
         is_float = taken.is_floating_point() if is_tensor(taken) else taken.dtype.kind in "fc"
-        taken[_like(values, nowhere)] = float("nan") if is_float else taken.dtype.type()
+        taken[like(values, nowhere)] = float("nan") if is_float else taken.dtype.type()
     return taken
 
 
-def _weighted_sum(
-    values: NDArray[Any], index: IntArray, weights: FloatArray
-) -> NDArray[Any]:
+def _weighted_sum(values: NDArray[Any], index: IntArray, weights: FloatArray) -> NDArray[Any]:
     """Add up in double precision, and return to the type of the values."""
     columns = (slice(None), *(None,) * (values.ndim - 1))
     total: NDArray[Any] = np.zeros((len(index), *values.shape[1:]), np.result_type(values, float))
@@ -105,17 +112,17 @@ def _interpolate_tensor(values: Any, index: IntArray, weights: FloatArray, metho
         return pick(values, index[np.arange(len(index)), weights.argmax(axis=1)])
     if not is_float:
         total = _weighted_sum(to_numpy(values), index, weights)
-        return _like(values, total)
-    weight = _like(values, weights).to(values.dtype)
+        return like(values, total)
+    weight = like(values, weights).to(values.dtype)
     weight = weight.reshape(*weights.shape, *(1,) * (values.ndim - 1))
-    total = (weight * values[_like(values, index)]).sum(1)
+    total = (weight * values[like(values, index)]).sum(1)
     nowhere = np.flatnonzero(index[:, 0] < 0)
     if len(nowhere):
-        total[_like(values, nowhere)] = float("nan")
+        total[like(values, nowhere)] = float("nan")
     return total
 
 
-def _like(values: Any, array: NDArray[Any]) -> Any:
+def like(values: Any, array: NDArray[Any]) -> Any:
     """Return an array as what the values are, a tensor on the same device or an array."""
     if not is_tensor(values):
         return array

@@ -18,7 +18,7 @@ LEVELS = {
     2: ["halfedge", "twins", "order", "orient", "edge_sets", "bvh", "curves", "polyline", "clean"],
     3: [
         "quality", "distance", "features", "turns", "creases", "_chains", "_echo", "corners", "sizing",
-        "curvature", "gradation",
+        "curvature", "gradation", "mesh_data", "meshio_data", "objects", "transfer",
     ],
     4: [
         "operations", "operations.split", "operations.collapse", "operations.flip",
@@ -28,7 +28,7 @@ LEVELS = {
     ],
     5: [
         "options", "constraints", "prepare", "lengths", "reference", "seams", "deviation",
-        "report", "sweeps", "provenance", "extract", "transfer", "result", "job", "remesh",
+        "report", "sweeps", "sides", "provenance", "extract", "result", "job", "remesh",
     ],
     6: [
         "laplacians", "solver", "motion", "fairing", "editing", "multiresolution", "smoothing",
@@ -47,6 +47,7 @@ SIDEWAYS = {
     ("bvh", "halfedge"), ("curves", "halfedge"), ("orient", "twins"), ("polyline", "halfedge"),
     ("polyline", "curves"),
     ("creases", "_chains"), ("creases", "_echo"), ("creases", "turns"), ("_echo", "turns"),
+    ("meshio_data", "mesh_data"), ("objects", "mesh_data"), ("objects", "meshio_data"),
     ("features", "turns"), ("sizing", "curvature"), ("sizing", "gradation"),
     ("operations.collapse", "operations.guards"), ("operations.siblings", "operations.collapse"),
     ("operations.bisect", "operations.measure"), ("operations.collapse", "operations.measure"),
@@ -60,9 +61,9 @@ SIDEWAYS = {
     *(("sweeps", name) for name in (
         "options", "lengths", "reference", "seams", "deviation", "report",
     )),
-    ("provenance", "report"), ("result", "report"), ("result", "transfer"),
+    ("sides", "report"), ("provenance", "sides"), ("result", "report"),
     *(("extract", name) for name in (
-        "constraints", "prepare", "provenance", "reference", "report", "seams",
+        "constraints", "prepare", "reference", "report", "seams", "sides",
     )),
     *(("job", name) for name in ("constraints", "prepare", "lengths", "reference", "sweeps")),
     *(("remesh", name) for name in (

@@ -1,4 +1,4 @@
-"""Surfaces with texture coordinates on corners, cut along seams, whose right values are known everywhere."""
+"""Surfaces with texture coordinates on corners, cut along seams."""
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def cube(n=6):
         flip = ahead[axis] * (2 * side - 1) < 0
         F.append((square[:, ::-1] if flip else square) + len(p) * k)
         tile = (uv[:, ::-1] if flip else uv) * 0.9 + 0.05
-        UV.append((tile + [k % 3, k // 3]) / [3, 2])
+        UV.append((tile + np.array([k % 3, k // 3])) / [3, 2])
         V.append(x)
     V, F, UV = np.concatenate(V), np.concatenate(F), np.concatenate(UV)
     _, first, same = np.unique(V.round(9), axis=0, return_index=True, return_inverse=True)
