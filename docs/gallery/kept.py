@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from benchmarks.panels import FloatArray, IntArray, Panel, Picture, borders, by_label
+from benchmarks.panels import FloatArray, IntArray, Panel, Picture, borders, by_amount, by_label
 from benchmarks.shapes import flag, notched_sheet
 from remeshvec import remesh
 
@@ -90,6 +90,23 @@ def preserve() -> Picture:
     return side_by_side(panels, (75.0, 40.0))
 
 
+def return_result() -> Picture:
+    """Remesh an object of trimesh, which carries a field; the field in colour."""
+    import trimesh
+
+    V, F = mesh("creature")
+    before = trimesh.Trimesh(V, F, process=False)
+    before.vertex_attributes["field"] = np.cos(8 * V[:, 0]) ** 2
+    after, result = remesh(before, 0.08, return_result=True)
+    panels = []
+    for name, it, lines in (("mesh", before, None), ("even", after, result.feature_edges)):
+        vertices, faces = np.asarray(it.vertices), np.asarray(it.faces)
+        field = it.vertex_attributes["field"][faces].mean(axis=1)
+        caption = f"{name}.vertex_attributes['field']"
+        panels.append(Panel(caption, vertices, faces, by_amount(field, 1.0), lines))
+    return side_by_side(panels, CREATURE)
+
+
 def torus(nu: int = 60, nv: int = 24) -> tuple[FloatArray, IntArray, FloatArray]:
     """Torus with texture coordinates (m, 3, 2) from 0 to 1 around it, that jump at two seams."""
     i, j = (k.ravel() for k in np.meshgrid(np.arange(nu), np.arange(nv), indexing="ij"))
@@ -140,4 +157,5 @@ def shortest_path(V: FloatArray, F: IntArray, start: int, end: int) -> IntArray:
 
 PICTURES = (
     feature_angle, feature_edges, fixed_vertices, fixed_faces, face_labels, preserve, selection, boundary,
+    return_result,
 )  # fmt: skip
