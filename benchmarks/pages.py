@@ -8,6 +8,7 @@ from pathlib import Path
 
 from . import contenders as who
 from . import plots, start, targets
+from .comparison import comparison_page
 from .contenders import CONTENDERS
 from .measures import COLUMNS, LEGEND, cells
 from .meshes import SAMPLES
@@ -86,6 +87,7 @@ def write_pages(folder: Path) -> None:
     pictures = plots.write_plots(folder / "plots", results)
     for name, text in {
         "benchmarks.md": _benchmarks(results, pictures),
+        "comparison.md": comparison_page(results),
         "threads.md": _threads(results, pictures),
         "start.md": start.as_page(results),
     }.items():

@@ -51,6 +51,7 @@ class Picture(NamedTuple):
     panels: list[Panel]
     view: tuple[float, float] = (30.0, 25.0)  # degrees: to the right of the front (-y), upwards
     columns: int = 3
+    width: int = WIDTH  # pixels
 
 
 class Frame(NamedTuple):
@@ -62,13 +63,13 @@ class Frame(NamedTuple):
     pixels: tuple[int, int]  # of one panel, without its caption
 
 
-def draw(path: Path, picture: Picture) -> None:
+def draw(path: Path, picture: Picture, largest: int = LARGEST) -> None:
     """Render a picture into a PNG file with a palette, without a window.
 
     Raises
     ------
     SystemExit
-        The file would be larger than `LARGEST`.
+        The file would be larger than ``largest`` bytes.
     """
     from PIL import Image, ImageDraw, ImageFont
 
@@ -86,8 +87,8 @@ def draw(path: Path, picture: Picture) -> None:
         pen.multiline_text(place, text, viz.TEXT, font, "mm", align="center")
     content = io.BytesIO()
     page.quantize(COLOURS, dither=Image.Dither.NONE).save(content, "PNG", optimize=True)
-    if content.tell() > LARGEST:
-        raise SystemExit(f"{path.name}: {content.tell():,} bytes, more than {LARGEST:,}")
+    if content.tell() > largest:
+        raise SystemExit(f"{path.name}: {content.tell():,} bytes, more than {largest:,}")
     path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, content.getvalue())
 
@@ -161,7 +162,7 @@ def _frame(picture: Picture) -> Frame:
     low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
     across, upwards = MARGIN * (high - low)[:2] / 2
     shape = float(np.clip(upwards / across, LOWEST, HIGHEST))
-    width = WIDTH // picture.columns
+    width = picture.width // picture.columns
     pixels = (width, round(shape * width))
     return Frame(axes, (low + high) / 2 @ axes, max(across, upwards / shape), pixels)
 

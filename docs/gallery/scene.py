@@ -1,0 +1,73 @@
+"""What the scripts of the gallery share: meshes of ``data``, panels, colours that measure faces."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.meshes import load
+from benchmarks.panels import FloatArray, IntArray, Panel, Picture, by_amount
+
+CREATURE = (20.0, 15.0)  # views: degrees to the right of the front, upwards
+BRACKET = (35.0, 30.0)
+SHEET = (0.0, 55.0)
+WIDTH = 900  # pixels of a picture
+
+
+def mesh(name: str) -> tuple[FloatArray, IntArray]:
+    """Vertices and faces of a mesh in ``data``."""
+    sample = load(name)
+    return sample.V, sample.F
+
+
+def side_by_side(panels: list[Panel], view: tuple[float, float], columns: int = 2) -> Picture:
+    """Panels of one picture."""
+    return Picture(panels, view, columns, WIDTH)
+
+
+def panel(caption: str, result: Any, colours: Any = None, note: str = "", **more: Any) -> Panel:
+    """Show a result with its feature edges, and without dots unless they are given."""
+    return Panel(caption, result.V, result.F, colours, result.feature_edges, note=note, **more)
+
+
+def smallest_angles(V: FloatArray, F: IntArray) -> FloatArray:
+    """Degrees, one a face."""
+    a, b, c = np.moveaxis(lengths(V, F), 1, 0)
+    cosines = [(x**2 + y**2 - z**2) / (2 * x * y) for x, y, z in ((a, b, c), (b, c, a), (c, a, b))]
+    return np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).min(axis=0)
+
+
+def lengths(V: FloatArray, F: IntArray) -> FloatArray:
+    """Lengths of the edges of every face, (m, 3)."""
+    return np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2)
+
+
+def by_angle(result: Any, worst: float = 36.0, good: float = 46.0) -> Any:
+    """Colour faces whose smallest angle is small: full colour at ``worst`` degrees."""
+    return by_amount(np.maximum(good - smallest_angles(result.V, result.F), 0.0), good - worst)
+
+
+def by_length(result: Any, low: float = 0.8, high: float = 4 / 3) -> Any:
+    """Colour faces with an edge below ``low * L`` or above ``high * L``: full colour at twice as far."""
+    ratio = np.log(lengths(result.V, result.F) / result.report.target_length)
+    outside = np.maximum(ratio - np.log(high), np.log(low) - ratio).max(axis=1)
+    return by_amount(np.maximum(outside, 0.0), 0.25)
+
+
+def distances(V: FloatArray, F: IntArray, result: Any) -> FloatArray:
+    """Distance from the input of every face's middle and those of its edges, the largest."""
+    corners = result.V[result.F]
+    points = [corners.mean(axis=1), *np.moveaxis(corners + np.roll(corners, 1, axis=1), 1, 0) / 2]
+    return np.max([_distance(P, V, F) for P in points], axis=0)
+
+
+def vertex_distances(V: FloatArray, F: IntArray, result: Any) -> FloatArray:
+    """Distance of every vertex of the result from the input."""
+    return _distance(result.V, V, F)
+
+
+def _distance(P: FloatArray, V: FloatArray, F: IntArray) -> FloatArray:
+    import igl
+
+    return np.sqrt(igl.point_mesh_squared_distance(np.ascontiguousarray(P), V, F)[0])
