@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from remeshvec import viz
+from remeshvec.mesh_data import split_vertices
 from remeshvec.mesh_files import write_file
 
 FloatArray = NDArray[np.float64]
@@ -40,6 +41,7 @@ class Panel(NamedTuple):
     lines: IntArray | None = None  # (k, 2) edges drawn thick
     dots: IntArray | None = None  # (k,) vertices
     note: str = ""
+    texture: tuple[FloatArray, NDArray[np.uint8]] | None = None  # (m, 3, 2) on corners; the image
     close_up: tuple[FloatArray, float] | None = (
         None  # middle of what is seen; how many times larger
     )
@@ -197,6 +199,11 @@ def _add(plotter: Any, pyvista: Any, panel: Panel, points: FloatArray, width: in
     colours: dict[str, Any] = {"color": viz.FRONT, "backface_params": {"color": viz.BACK}}
     if panel.colours is not None:
         colours = {"scalars": panel.colours, "rgb": True}
+    if panel.texture is not None:
+        corner, F = split_vertices(panel.F, [panel.texture[0]])
+        surface = pyvista.PolyData.from_regular_faces(points[panel.F.ravel()[corner]], F)
+        surface.active_texture_coordinates = panel.texture[0].reshape(-1, 2)[corner]
+        colours = {"texture": pyvista.Texture(panel.texture[1])}
     plotter.add_mesh(
         surface,
         **colours,

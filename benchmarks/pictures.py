@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from remeshvec import Adaptive, remesh
+from remeshvec.data_files import read_data
 
 from .films import catenoid, cube, rings, splitting
 from .meshes import load
@@ -34,6 +36,8 @@ from .panels import (
 from .scenes import bend, bump, smoothing, twist
 from .shapes import double_bubble, flag, half_discs, notched_sheet
 from .tables import DOCS
+
+DATA = Path(__file__).resolve().parents[1] / "data"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -137,6 +141,27 @@ def thin_sheet() -> Picture:
     return Picture([Panel("input", V, F), after, corner], view=(20.0, 25.0))
 
 
+def texture() -> Picture:
+    """A texture stays where it was, and its seam, at the right, a seam."""
+    data, _ = read_data(DATA / "vase.obj")
+    V, F, uv = data.V, data.F, data.on_corners["uv"]
+    image = np.asarray(Image.open(DATA / "vase.png").convert("RGB"))
+    result = remesh(V, F, 0.06, preserve=uv)
+    seam = np.sort(result.feature_edges, axis=1)
+    at_zero = (abs(result.V[seam][:, :, 1]) < 1e-3).all(axis=1) & (result.V[seam][:, 0, 0] > 0)
+    panels = [
+        Panel("input", V, F, texture=(uv, image)),
+        Panel(
+            "remesh(V, F, 0.06, preserve=uv)",
+            result.V,
+            result.F,
+            lines=seam[at_zero],
+            texture=(result.transfer(uv, on="corners"), image),
+        ),
+    ]
+    return Picture(panels, view=(70.0, 20.0), columns=2, width=900)
+
+
 # --- parts of pictures ---------------------------------------------------------------------------
 
 
@@ -208,6 +233,7 @@ PICTURES: dict[str, Callable[[], Picture]] = {
         non_manifold,
         max_deviation,
         thin_sheet,
+        texture,
         bump,
         twist,
         bend,

@@ -10,13 +10,14 @@ from __future__ import annotations
 import argparse
 import hashlib
 import sys
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
 import igl
 import numpy as np
 import shapes
-from shapes import Floats, Ints, Mesh
+from shapes import Floats, Ints
 
 HERE = Path(__file__).resolve().parent
 TABLE_HEAD = (
@@ -24,20 +25,33 @@ TABLE_HEAD = (
     "|---|---|---|---|---|---|---|\n"
 )
 
-MESHES: dict[str, tuple[Callable[[], Mesh], int]] = {  # name -> maker, decimals
+MESHES: dict[
+    str, tuple[Callable[[], tuple[Floats | Ints, ...]], int]
+] = {  # name -> maker, decimals
     "creature.obj": (shapes.creature, 5),
     "bracket.obj": (shapes.bracket, 6),
     "wavy_sheet.obj": (shapes.wavy_sheet, 5),
     "pretzel.off": (shapes.pretzel, 5),
     "linked_rings.off": (shapes.linked_rings, 5),
     "thin_sheet.obj": (shapes.thin_sheet, 5),
+    "vase.obj": (shapes.vase, 5),  # with texture coordinates
 }
+MATERIAL = "newmtl painted\nKd 1 1 1\nmap_Kd vase.png\n"
 
 
-def as_text(name: str, V: Floats, F: Ints, decimals: int) -> str:
-    """Write OBJ or OFF with as many digits as the mesh needs."""
+def as_text(name: str, V: Floats, F: Ints, decimals: int, uv: Floats | None = None) -> str:
+    """Write OBJ or OFF with as many digits as the mesh needs; texture coordinates (m, 3, 2) in OBJ."""
     V = np.round(V, decimals) + 0.0  # + 0.0 turns -0 into 0
     rows = [" ".join(f"{x:.{decimals}f}".rstrip("0").rstrip(".") for x in p) for p in V]
+    if uv is not None:
+        known, at = np.unique(uv.reshape(-1, 2).round(decimals), axis=0, return_inverse=True)
+        corners = np.stack([F, at.reshape(F.shape)], axis=2).reshape(-1, 6) + 1
+        head = [f"mtllib {name[:-4]}.mtl"]
+        textures = [f"vt {s:.{decimals}f} {t:.{decimals}f}" for s, t in known.tolist()]
+        faces = ["f {}/{} {}/{} {}/{}".format(*f) for f in corners.tolist()]
+        return "\n".join(
+            [*head, *("v " + row for row in rows), *textures, "usemtl painted", *faces, ""]
+        )
     if name.endswith(".obj"):
         faces = ["f {} {} {}".format(*f) for f in (F + 1).tolist()]
         return "\n".join([*("v " + row for row in rows), *faces, ""])
@@ -74,6 +88,26 @@ def table_row(name: str, V: Floats, F: Ints, text: str) -> str:
     return f"| {name} | {counts} | `{hashlib.sha256(text.encode()).hexdigest()}` |\n"
 
 
+def as_png(image: Ints, palette: Ints) -> bytes:
+    """Write a PNG file with a palette, not compressed, so that it is the same with every zlib."""
+
+    def chunk(kind: bytes, content: bytes) -> bytes:
+        check = zlib.crc32(kind + content).to_bytes(4, "big")
+        return len(content).to_bytes(4, "big") + kind + content + check
+
+    height, width = image.shape
+    size = width.to_bytes(4, "big") + height.to_bytes(4, "big")
+    rows = np.column_stack([np.zeros(height, np.uint8), image.astype(np.uint8)]).tobytes()
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        [
+            chunk(b"IHDR", size + bytes([8, 3, 0, 0, 0])),
+            chunk(b"PLTE", palette.astype(np.uint8).tobytes()),
+            chunk(b"IDAT", zlib.compress(rows, 0)),
+            chunk(b"IEND", b""),
+        ]
+    )
+
+
 def main() -> int:
     """Write or check the meshes and the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -81,9 +115,9 @@ def main() -> int:
     check = parser.parse_args().check
     different, table = [], TABLE_HEAD
     for name, (make, decimals) in MESHES.items():
-        V, F = make()
+        V, F, *uv = make()
         validated(name, V, F, decimals)
-        text = as_text(name, V, F, decimals)
+        text = as_text(name, V, F, decimals, *uv)
         table += table_row(name, V, F, text)
         path = HERE / name
         if check and (not path.exists() or path.read_bytes() != text.encode()):
@@ -91,6 +125,15 @@ def main() -> int:
         if not check:
             path.write_bytes(text.encode())
             print(f"{name:<18}{len(V):>7} vertices{len(F):>7} faces{len(text) / 1e3:>7.0f} kB")
+    for name, content in (
+        ("vase.mtl", MATERIAL.encode()),
+        ("vase.png", as_png(*shapes.vase_texture())),
+    ):
+        path = HERE / name
+        if check and (not path.exists() or path.read_bytes() != content):
+            different.append(name)
+        if not check:
+            path.write_bytes(content)
     readme = HERE / "README.md"
     text = readme.read_text(encoding="utf-8")
     start, stop = text.rindex("| file |"), text.rindex("|\n") + 2

@@ -381,3 +381,59 @@ def ring(n: int, m: int, radius: float, twist: float) -> Mesh:
     i2, j2 = (i + 1) % n, (j + 1) % m
     a, b, c, d = i * m + j, i2 * m + j, i2 * m + j2, i * m + j2
     return outward(V, np.vstack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
+
+
+# --- vase ----------------------------------------------------------------------------------------
+
+VASE_AROUND, VASE_UP = 36, 44
+
+
+def vase() -> tuple[Floats, Ints, Floats]:
+    """Make an open vase with a texture wrapped around it once, coordinates (m, 3, 2) on corners.
+
+    Rows crowd at the foot, columns are uneven, diagonals random: as modellers leave surfaces of
+    revolution. Every vertex lies on the surface at its texture coordinates.
+    """
+    rng = np.random.default_rng(11)
+    i, j = np.meshgrid(np.arange(VASE_AROUND + 1), np.arange(VASE_UP + 1), indexing="ij")
+    u, v = i / VASE_AROUND, (j / VASE_UP) ** 1.5
+    u = u + 0.012 * np.sin(6 * np.pi * u)
+    inner = (i > 0) & (i < VASE_AROUND) & (j > 0) & (j < VASE_UP)
+    u = u + np.where(inner, rng.uniform(-0.25, 0.25, u.shape) / VASE_AROUND, 0)
+    v = v + np.where(
+        inner, rng.uniform(-0.3, 0.3, v.shape) * 1.5 * np.sqrt(j / VASE_UP) / VASE_UP, 0
+    )
+    faces = []
+    for a in range(VASE_AROUND):
+        for b in range(VASE_UP):
+            p, q, r, s = (a, b), (a + 1, b), (a + 1, b + 1), (a, b + 1)
+            faces += [(p, q, r), (p, r, s)] if rng.random() < 0.5 else [(p, q, s), (q, r, s)]
+    at = np.array(faces)  # (m, 3, 2): column and row of every corner
+    uv = np.stack([u[at[..., 0], at[..., 1]], v[at[..., 0], at[..., 1]]], axis=-1)
+    F = (at[..., 0] % VASE_AROUND) * (VASE_UP + 1) + at[..., 1]
+    u, v = u[:-1].ravel(), v[:-1].ravel()
+    radius = (
+        0.55
+        + 0.4 * np.sin(np.pi * (1.15 * v - 0.1)) ** 2
+        - 0.25 * v
+        + 0.5 * np.maximum(v - 0.85, 0)
+    )
+    angle = 2 * np.pi * u
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), 2.2 * v], axis=1), F, uv
+
+
+def vase_texture(width: int = 256, height: int = 256) -> tuple[Ints, Ints]:
+    """Painted bands: colours (height, width) as places in a palette (k, 3), top row first."""
+    palette = np.array([[194, 91, 52], [32, 28, 30], [238, 222, 190], [126, 44, 30]])
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width, 1 - (np.arange(height) + 0.5) / height)
+    zigzag = abs((16 * x) % 2 - 1)
+    image = np.zeros((height, width), np.int64)
+    image[(y < 0.08) | (y > 0.93)] = 1
+    image[(y > 0.12) & (y < 0.15) | (y > 0.85) & (y < 0.88)] = 3
+    image[(y > 0.2) & (y < 0.32) & (y < 0.2 + 0.12 * zigzag)] = 1
+    squares = (np.floor(16 * x) + np.floor(16 * y)) % 2 == 0
+    image[(y > 0.375) & (y < 0.625)] = 2
+    image[(y > 0.375) & (y < 0.625) & squares] = 1
+    dots = np.hypot((12 * x) % 1 - 0.5, (12 * (y - 0.66)) % 1 - 0.5) < 0.32
+    image[(y > 0.66) & (y < 0.66 + 1 / 6) & dots] = 2
+    return image, palette

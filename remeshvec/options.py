@@ -115,6 +115,7 @@ def make_options(preset: str, overrides: dict[str, Any]) -> Options:
         changes["foldover"] = _angle("foldover", given.pop("foldover"))
     if "untangle_angle" in given:
         changes["untangle_angle"] = _angle("untangle_angle", given.pop("untangle_angle"))
+        changes["untangle_rounds"] = options.untangle_rounds or _DEFAULT.untangle_rounds
     if "tol" in given:
         changes["tol"] = _share("tol", given.pop("tol"))
     if "max_deviation" in given:

@@ -171,8 +171,8 @@ def remesh(
         Whether vertices end on the input surface; True by default. ``False`` is the algorithm as
         published, which lets them drift.
     untangle_angle : float, optional
-        Degrees; triangles with a smaller angle are improved at the end. 41.5 by default, except for the
-        preset ``"fast"``, which does not.
+        Degrees; triangles with a smaller angle are improved at the end. 41.5 by default; the preset
+        ``"fast"`` does so only if asked.
     fit : bool, optional
         Let vertices leave the input by up to 0.2 L so that faces straddle it: less RMS
         distance. On in ``"fine"``.

@@ -33,7 +33,7 @@ def shapes():
 def test_the_table_lists_the_files():
     files = {path.name for path in zoo.DATA.iterdir() if path.suffix in (".obj", ".off")}
     assert set(NAMES) == files
-    assert len(files) == 6
+    assert len(files) == 7
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -65,6 +65,12 @@ def test_overrides():
     assert options().threads == available_threads()
 
 
+def test_an_angle_asked_for_is_reached_for_by_every_preset():
+    assert make_options("fast", {}).untangle_rounds == 0
+    asked = make_options("fast", {"untangle_angle": 30})
+    assert asked.untangle_rounds == make_options("default", {}).untangle_rounds > 0
+
+
 def test_fit_can_be_switched_on_and_off():
     assert options("default", fit=True).fit_rounds > 0
     assert options("fine", fit=False).fit_rounds == 0
