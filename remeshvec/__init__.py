@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from .distance import SurfaceDistance, surface_distance
 from .errors import (
+    BatchError,
     MeshFormatError,
     MeshInputError,
     OptionError,
     RemeshvecError,
     SingularSystemError,
+    WorkerError,
 )
 from .mesh_files import MeshFile, read_mesh, write_mesh
 from .quality import Quality, quality
@@ -20,6 +22,7 @@ from .report import RemeshResult, Report
 from .sizing import Adaptive
 
 if TYPE_CHECKING:
+    from .batch import BatchItem, remesh_many
     from .editing import Editor, deform
     from .fairing import fair
     from .laplacians import cotangent_matrix, laplacian, vertex_areas
@@ -31,6 +34,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Adaptive",
+    "BatchError",
+    "BatchItem",
     "EditedSurface",
     "Editor",
     "LaplacianSolver",
@@ -45,6 +50,7 @@ __all__ = [
     "Report",
     "SingularSystemError",
     "SurfaceDistance",
+    "WorkerError",
     "cotangent_matrix",
     "deform",
     "fair",
@@ -52,14 +58,16 @@ __all__ = [
     "quality",
     "read_mesh",
     "remesh",
+    "remesh_many",
     "smooth",
     "surface_distance",
     "vertex_areas",
     "write_mesh",
 ]
 
-# Imported when first asked for: they need scipy.sparse, which remeshing does not.
+# Imported when first asked for: they need scipy.sparse, which remeshing does not, or start processes.
 _LATE = {
+    "BatchItem": "batch",
     "EditedSurface": "multiresolution",
     "Editor": "editing",
     "LaplacianSolver": "solver",
@@ -68,6 +76,7 @@ _LATE = {
     "deform": "editing",
     "fair": "fairing",
     "laplacian": "laplacians",
+    "remesh_many": "batch",
     "smooth": "smoothing",
     "vertex_areas": "laplacians",
 }

@@ -32,12 +32,14 @@ LEVELS = {
     ],
     6: [
         "laplacians", "solver", "motion", "fairing", "editing", "multiresolution", "smoothing",
-        "_file_guards", "_ply_guard", "_mesh_writers", "mesh_files",
+        "_file_guards", "_ply_guard", "_mesh_writers", "mesh_files", "_serving", "_workers",
+        "_progress",
     ],
     7: [
         "evolver", "evolver.energies", "evolver.problem", "evolver.minimize",
         "evolver.necks", "evolver.evolve", "evolver.errors", "evolver.surface_evolver",
-        "viz", "_arguments", "_array_files", "cli",
+        "viz", "batch", "_arguments", "_array_files", "_batch_files", "_batch_table", "_batch_command",
+        "cli",
     ],
     8: ["__main__"],
 }  # fmt: skip
@@ -70,11 +72,13 @@ SIDEWAYS = {
     ("smoothing", "laplacians"), ("smoothing", "solver"),
     ("_ply_guard", "_file_guards"),
     ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
+    ("_workers", "_serving"),
     ("evolver.problem", "evolver.energies"), ("evolver.minimize", "evolver.problem"),
     ("evolver.necks", "evolver.energies"),
     *(("evolver.surface_evolver", f"evolver.{name}") for name in ("errors", "minimize", "problem")),
     *(("evolver.evolve", f"evolver.{name}") for name in ("energies", "minimize", "necks", "problem")),
-    ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"),
+    *(("cli", name) for name in ("_arguments", "_array_files", "_batch_command", "viz")),
+    *(("_batch_command", name) for name in ("_arguments", "_batch_files", "_batch_table")),
 }  # fmt: skip
 LEVEL = {name: level for level, names in LEVELS.items() for name in names}
 
