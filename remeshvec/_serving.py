@@ -61,7 +61,9 @@ def _work(messages: queue.SimpleQueue[bytes | None], target: BinaryIO) -> None:
     if setup is None:
         return
     try:
-        function, common = pickle.loads(setup)
+        function, common, warm_up = pickle.loads(setup)
+        if warm_up is not None:
+            warm_up()
     except Exception as error:
         send(target, pickle.dumps(f"{type(error).__name__}: {error}"))
         return

@@ -61,6 +61,7 @@ def run_in_processes(
     workers: int,
     ordered: bool = True,
     timeout: float | None = None,
+    warm_up: Callable[[], None] | None = None,
 ) -> Iterator[Outcome]:
     """Do tasks in processes: ``function(task, common)``.
 
@@ -79,6 +80,8 @@ def run_in_processes(
         Whether outcomes come in the order of the tasks.
     timeout : float, optional
         Seconds after which a task is given up, with its worker.
+    warm_up : callable, optional
+        What a worker does before its first task, outside of the timeout.
 
     Raises
     ------
@@ -87,7 +90,7 @@ def run_in_processes(
     WorkerError
         No worker can be started.
     """
-    pool = _Pool(_setup(function, common), workers, timeout)
+    pool = _Pool(_setup(function, common, warm_up), workers, timeout)
     try:
         yield from _collect(pool, iter(tasks), AHEAD * workers, ordered)
     finally:
@@ -119,15 +122,15 @@ def _collect(pool: _Pool, tasks: Iterator[Any], most: int, ordered: bool) -> Ite
         yield outcome
 
 
-def _setup(function: Callable[..., Any], common: Any) -> bytes:
+def _setup(*parts: Any) -> bytes:
     try:
-        content = pickle.dumps((function, common), 5)
+        content = pickle.dumps(parts, 5)
         if b"__main__" not in content:
             return content
     except Exception as error:
         content = None
         problem = error
-    content = _with_cloudpickle((function, common)) or content
+    content = _with_cloudpickle(parts) or content
     if content is None:
         raise OptionError(
             f"an option cannot be sent to worker processes ({problem}); functions can with the package "

@@ -17,7 +17,7 @@ from .mesh_files import MeshFile, read_mesh
 from .remesh import Lengths, remesh
 from .report import RemeshResult
 
-__all__ = ["BatchItem", "remesh_many"]
+__all__ = ["BatchItem", "remesh_many", "warm_up"]
 
 
 @dataclass
@@ -160,7 +160,16 @@ def _with_names(items: Iterator[Any], options: dict[str, Any], crew: _Crew) -> I
 def _outcomes(tasks: Iterator[Any], options: dict[str, Any], crew: _Crew) -> Iterator[Outcome]:
     if crew.workers == 1 and crew.timeout is None:
         return run_here(_remesh_here, tasks, options)
-    return run_in_processes(_remesh_there, tasks, options, crew.workers, crew.ordered, crew.timeout)
+    return run_in_processes(
+        _remesh_there, tasks, options, crew.workers, crew.ordered, crew.timeout,
+        None if crew.timeout is None else warm_up,
+    )  # fmt: skip
+
+
+def warm_up() -> None:
+    """Load kernels, or compile them: that takes its time, and is no item's fault."""
+    faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    remesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces, 0.3)
 
 
 def _raising(done: Iterator[BatchItem]) -> Iterator[BatchItem]:

@@ -78,7 +78,7 @@ SIDEWAYS = {
     *(("evolver.surface_evolver", f"evolver.{name}") for name in ("errors", "minimize", "problem")),
     *(("evolver.evolve", f"evolver.{name}") for name in ("energies", "minimize", "necks", "problem")),
     *(("cli", name) for name in ("_arguments", "_array_files", "_batch_command", "viz")),
-    *(("_batch_command", name) for name in ("_arguments", "_batch_files", "_batch_table")),
+    *(("_batch_command", name) for name in ("_arguments", "_batch_files", "_batch_table", "batch")),
 }  # fmt: skip
 LEVEL = {name: level for level, names in LEVELS.items() for name in names}
 
