@@ -10,6 +10,7 @@ import signal
 import struct
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from time import perf_counter
@@ -17,7 +18,9 @@ from typing import Any, BinaryIO
 
 from .errors import RemeshvecError, WorkerError
 
-__all__ = ["attempt", "receive", "send", "serve"]
+__all__ = ["PATIENCE", "attempt", "receive", "send", "serve"]
+
+PATIENCE = 5.0  # seconds to clear away what a process is about, before it is killed
 
 _LENGTH = struct.Struct("<Q")  # of a message, before it
 
@@ -53,7 +56,17 @@ def _read(source: BinaryIO, messages: queue.SimpleQueue[bytes | None]) -> None:
             messages.put(receive(source))
     except (EOFError, OSError, ValueError):
         messages.put(None)
+        _interrupt()
+
+
+def _interrupt() -> None:
+    """Let the main thread drop what it is doing, and end the process where it does not."""
+    if hasattr(signal, "pthread_kill"):  # ends system calls, too
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
+    else:
         _thread.interrupt_main(signal.SIGTERM)
+    time.sleep(PATIENCE)
+    os._exit(1)
 
 
 def _work(messages: queue.SimpleQueue[bytes | None], target: BinaryIO) -> None:

@@ -20,7 +20,7 @@ from contextlib import suppress
 from time import monotonic, perf_counter
 from typing import Any, BinaryIO, NamedTuple
 
-from ._serving import attempt, receive, send
+from ._serving import PATIENCE, attempt, receive, send
 from ._threads import available_threads
 from .errors import OptionError, WorkerError
 
@@ -30,7 +30,6 @@ __all__ = ["Outcome", "run_here", "run_in_processes"]
 # where answers have to keep their order, for an earlier one. Sizes differ by a factor of twenty.
 AHEAD = 4
 
-PATIENCE = 5.0  # seconds for a worker to clear away what it is about; then it is killed
 _STARTS = 3  # tries to start a worker
 
 _START = (
