@@ -179,9 +179,10 @@ def _work(todo: list[Job], batch: _Batch) -> None:
 
 
 def _outcomes(todo: list[Job], options: argparse.Namespace) -> Any:
-    workers = min(options.workers or available_threads(), max(1, len(todo)))
+    workers = options.workers or available_threads()
     if workers == 1 and options.timeout is None:
         return run_here(_remesh_file, todo, options)
+    workers = max(1, min(workers, len(todo)))
     return run_in_processes(
         _remesh_file, todo, options, workers, False, options.timeout,
         None if options.timeout is None else warm_up,

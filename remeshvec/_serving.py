@@ -112,7 +112,16 @@ def attempt(
     try:
         return function(task, common), None, perf_counter() - start
     except Exception as error:
+        del task
+        _let_go_of_arrays(error)
         return None, error, perf_counter() - start
+
+
+def _let_go_of_arrays(error: BaseException | None) -> None:
+    """Keep of an error where it comes from, but no variables: many errors may be kept."""
+    while error is not None:
+        traceback.clear_frames(error.__traceback__)
+        error = error.__cause__ or error.__context__
 
 
 def _portable(error: Exception) -> Exception:

@@ -50,7 +50,10 @@ class Outcome(NamedTuple):
 def run_here(function: Callable[..., Any], tasks: Iterable[Any], common: Any) -> Iterator[Outcome]:
     """Do tasks one by one in this process; the next is taken when the last one's outcome is."""
     for index, task in enumerate(tasks):
-        yield Outcome(index, *attempt(function, task, common))
+        outcome = Outcome(index, *attempt(function, task, common))
+        task = None  # an error keeps the frames that led to it
+        yield outcome
+        del outcome
 
 
 def run_in_processes(

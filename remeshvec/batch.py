@@ -110,8 +110,14 @@ def remesh_many(
         workers = positive_count(workers, "workers")
     if timeout is not None:
         timeout = positive_number(timeout, "timeout", "seconds")
-    crew = _Crew(workers or available_threads(), ordered, timeout)
+    if isinstance(items, str | bytes):
+        raise OptionError(f"items must be many; for one of them say [{items!r}]")
     total = len(items) if isinstance(items, Sized) else None
+    workers = workers or available_threads()
+    is_here = workers == 1 and timeout is None
+    if total:
+        workers = min(workers, total)  # so that few large meshes get all cores
+    crew = _Crew(workers, is_here, ordered, timeout)
     done = _with_names(iter(items), {"L": L, **options}, crew)
     if on_error == "raise":
         done = _raising(done)
@@ -122,6 +128,7 @@ class _Crew(NamedTuple):
     """Who does the work, and how."""
 
     workers: int
+    is_here: bool  # nobody but this process
     ordered: bool
     timeout: float | None
 
@@ -158,7 +165,7 @@ def _with_names(items: Iterator[Any], options: dict[str, Any], crew: _Crew) -> I
 
 
 def _outcomes(tasks: Iterator[Any], options: dict[str, Any], crew: _Crew) -> Iterator[Outcome]:
-    if crew.workers == 1 and crew.timeout is None:
+    if crew.is_here:
         return run_here(_remesh_here, tasks, options)
     return run_in_processes(
         _remesh_there, tasks, options, crew.workers, crew.ordered, crew.timeout,

@@ -168,6 +168,8 @@ def test_arguments():
     assert list(remesh_many([])) == list(remesh_many([], workers=1)) == []
     with pytest.raises(TypeError):
         remesh_many(3)
+    with pytest.raises(OptionError, match=r"\['a.obj'\]"):
+        remesh_many("a.obj")
 
 
 # -- lazily ---------------------------------------------------------------------------------------
@@ -221,6 +223,26 @@ def test_nothing_is_kept_of_what_was_handed_on(workers):
         alive.append(sum(array() is not None for array in arrays))
     assert max(alive) <= _workers.AHEAD * workers
     gc.collect()
+    assert not any(array() is not None for array in arrays)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_errors_that_are_kept_keep_no_arrays(workers):
+    import weakref
+
+    arrays = []
+
+    def items():
+        for _ in range(4):
+            V, F = zoo.grid(5, 5)
+            V = V * np.nan
+            arrays.append(weakref.ref(V))
+            yield V, F
+            del V, F
+
+    kept = list(remesh_many(items(), workers=workers, on_error="collect"))
+    gc.collect()
+    assert all(isinstance(item.error, MeshInputError) for item in kept)
     assert not any(array() is not None for array in arrays)
 
 
