@@ -213,6 +213,8 @@ class _Pool:
                     worker = None
                 self._answers.put(outcome)
                 del outcome
+        except OSError as error:  # no more processes, or no memory for one
+            self._answers.put(WorkerError(f"no worker process can be started: {error}"))
         except Exception as error:
             self._answers.put(error)
         finally:
@@ -245,10 +247,10 @@ class _Pool:
                 self.workers.add(worker)
             try:
                 refusal = pickle.loads(worker.ask(self.setup))
-            except WorkerError:
+            except WorkerError as error:
                 self._let_go(worker)
                 if not left:
-                    raise
+                    raise WorkerError(f"no worker process can be started: {error}") from error
             else:
                 if refusal is None:
                     return worker
