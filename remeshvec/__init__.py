@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from .distance import SurfaceDistance, surface_distance
 from .errors import (
+    BatchError,
     MeshFormatError,
     MeshInputError,
     OptionError,
     RemeshvecError,
     SingularSystemError,
+    WorkerError,
 )
 from .mesh_files import MeshFile, read_mesh, write_mesh
 from .quality import Quality, quality
@@ -21,6 +23,7 @@ from .result import RemeshResult
 from .sizing import Adaptive
 
 if TYPE_CHECKING:
+    from .batch import BatchItem, remesh_many
     from .data_files import remesh_file
     from .editing import Editor, deform
     from .fairing import fair
@@ -34,6 +37,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Adaptive",
+    "BatchError",
+    "BatchItem",
     "EditedSurface",
     "Editor",
     "LaplacianSolver",
@@ -48,6 +53,7 @@ __all__ = [
     "Report",
     "SingularSystemError",
     "SurfaceDistance",
+    "WorkerError",
     "cotangent_matrix",
     "deform",
     "fair",
@@ -57,6 +63,7 @@ __all__ = [
     "read_mesh",
     "remesh",
     "remesh_file",
+    "remesh_many",
     "show_html",
     "smooth",
     "surface_distance",
@@ -65,8 +72,9 @@ __all__ = [
     "write_mesh",
 ]
 
-# Imported when first asked for: they need scipy.sparse, which remeshing does not.
+# Imported when first asked for: they need scipy.sparse, which remeshing does not, or start processes.
 _LATE = {
+    "BatchItem": "batch",
     "EditedSurface": "multiresolution",
     "Editor": "editing",
     "LaplacianSolver": "solver",
@@ -77,6 +85,7 @@ _LATE = {
     "html_report": "html_page",
     "laplacian": "laplacians",
     "remesh_file": "data_files",
+    "remesh_many": "batch",
     "show_html": "html_page",
     "smooth": "smoothing",
     "vertex_areas": "laplacians",

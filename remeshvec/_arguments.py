@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import argparse
 import math
+from typing import Any
 
 from . import __version__
+from .data_files import COMMON_SUFFIXES
+from .errors import OptionError
+from .mesh_files import MeshFile
+from .quality import quality
+from .sizing import Adaptive
 
-__all__ = ["DEFAULT_FACTOR", "parser"]
+__all__ = ["batch_parser", "given_options", "parser", "target_length"]
 
 DEFAULT_FACTOR = 0.9  # of the mean edge length; what the library takes when no length is given
 
@@ -21,8 +27,37 @@ examples:
   remeshvec part.stl -o part.ply --feature-angle 30   keep edges that turn by more than 30 degrees
   remeshvec cat.obj -o fine.obj --adaptive 0.001      short edges where the surface is curved
 
+  remeshvec batch 'in/*.obj' --out even               many meshes; see remeshvec batch --help
+
 FILE of numbers: text (white space or commas, # starts a comment) or .npy; indices count from 0.
 """
+
+BATCH_EPILOG = """\
+examples:
+  remeshvec batch 'in/*.obj' --out even                 all OBJ files of a folder
+  remeshvec batch 'in/**/*.stl' --out even --format ply --table even.parquet
+
+The same command again goes on after an interrupt, repeats what failed, and what was made from another
+input or with other options.
+
+exit status: 0 all meshes are done, 3 some failed, 2 bad arguments, 130 interrupted
+"""
+
+# Arguments that the library knows under the same name.
+_SAME = (
+    "iterations",
+    "tol",
+    "split",
+    "collapse",
+    "foldover",
+    "sliver_check",
+    "fit",
+    "threads",
+    "gradation",
+    "n_faces",
+    "n_vertices",
+    "max_deviation",
+)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -38,14 +73,88 @@ def parser() -> argparse.ArgumentParser:
     )
     result.add_argument("input", metavar="INPUT", help="mesh file")
     result.add_argument("-o", "--output", metavar="OUTPUT", help="mesh file to write")
-    _add_size_options(result.add_argument_group("how long edges become"))
-    _add_constraints(result.add_argument_group("what to keep"))
+    lengths = _add_size_options(result.add_argument_group("how long edges become"))
+    lengths.add_argument("--lengths", metavar="FILE", help="target edge length at every vertex")
+    keep = result.add_argument_group("what to keep")
+    _add_constraints(keep)
+    _add_files_of_constraints(keep)
     _add_remesh_options(result.add_argument_group("how to remesh"))
     _add_report_options(result.add_argument_group("what to show and save"))
     return result
 
 
-def _add_size_options(group: argparse._ArgumentGroup) -> None:
+def batch_parser() -> argparse.ArgumentParser:
+    """Return the parser of ``remeshvec batch``: all that does not name elements of one mesh."""
+    result = argparse.ArgumentParser(
+        prog="remeshvec batch",
+        description="Remesh many triangle meshes, several at a time.",
+        epilog=BATCH_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    result.add_argument(
+        "inputs",
+        metavar="INPUT",
+        nargs="+",
+        help="mesh files, or patterns in quotes; ** stands for folders in folders",
+    )
+    result.add_argument(
+        "--out",
+        metavar="DIR",
+        required=True,
+        help="folder to write to; folders of the inputs are kept below it",
+    )
+    result.add_argument(
+        "--format",
+        choices=[suffix[1:] for suffix in COMMON_SUFFIXES],
+        help="format to write (default: that of each input)",
+    )
+    result.add_argument(
+        "--workers", type=_at_least_one, metavar="N", help="meshes at a time (default: all cores)"
+    )
+    result.add_argument(
+        "--timeout", type=_positive, metavar="S", help="seconds after which a mesh is given up"
+    )
+    result.add_argument("--force", action="store_true", help="repeat also what is done")
+    result.add_argument(
+        "--table",
+        metavar="FILE",
+        help="table of results, .csv (default DIR/results.csv) or .parquet (beside that)",
+    )
+    result.add_argument("--quiet", action="store_true", help="show errors only")
+    result.add_argument("--version", action="version", version=f"remeshvec {__version__}")
+    _add_size_options(result.add_argument_group("how long edges become"))
+    _add_constraints(result.add_argument_group("what to keep"))
+    _add_remesh_options(result.add_argument_group("how to remesh"))
+    return result
+
+
+def target_length(options: argparse.Namespace, mesh: MeshFile) -> Any:
+    """Return the target length, None for the library's default or where a count is asked for."""
+    if options.adaptive is not None:
+        return Adaptive(options.adaptive, options.min_length, options.max_length)
+    if options.min_length is not None or options.max_length is not None:
+        raise OptionError("--min-length and --max-length go with --adaptive")
+    if options.length is not None or options.l_factor == DEFAULT_FACTOR:
+        return options.length
+    return options.l_factor * quality(mesh.V, mesh.F).edge_mean
+
+
+def given_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Return those options that were given, so that the presets decide on the others."""
+    given = {name: getattr(options, name) for name in _SAME}
+    given["project"] = False if options.no_project else None
+    chosen = {
+        "preset": options.preset,
+        "feature_angle": options.feature_angle,
+        "boundary": options.boundary,
+    }
+    return chosen | {k: v for k, v in given.items() if v is not None}
+
+
+def _add_size_options(
+    group: argparse._ArgumentGroup,
+) -> argparse._MutuallyExclusiveGroup:
+    """Add them; returns those that exclude each other."""
     length = group.add_mutually_exclusive_group()
     length.add_argument("--length", type=_positive, metavar="L", help="target edge length")
     length.add_argument(
@@ -55,7 +164,6 @@ def _add_size_options(group: argparse._ArgumentGroup) -> None:
         metavar="X",
         help="target edge length as a multiple of the mean edge length (default %(default)s)",
     )
-    length.add_argument("--lengths", metavar="FILE", help="target edge length at every vertex")
     length.add_argument(
         "--adaptive",
         type=_positive,
@@ -84,6 +192,7 @@ def _add_size_options(group: argparse._ArgumentGroup) -> None:
         metavar="D",
         help="largest distance between the input and the result",
     )
+    return length
 
 
 def _add_constraints(group: argparse._ArgumentGroup) -> None:
@@ -101,6 +210,9 @@ def _add_constraints(group: argparse._ArgumentGroup) -> None:
         help="boundary vertices slide along it (free), stay and get new ones between (split), or "
         "stay as they are (fixed)",
     )
+
+
+def _add_files_of_constraints(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--feature-edges", metavar="FILE", help="edges to keep, two vertices each")
     group.add_argument("--fixed-vertices", metavar="FILE", help="vertices that stay")
     group.add_argument("--fixed-faces", metavar="FILE", help="faces that stay")

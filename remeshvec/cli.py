@@ -9,22 +9,21 @@ import os
 import shlex
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
 import remeshvec
 
-from ._arguments import DEFAULT_FACTOR, parser
+from ._arguments import given_options, parser, target_length
 from ._array_files import read_array, write_arrays
 from .data_files import check_data_writable, read_data, with_kept, write_data
 from .errors import OptionError, RemeshvecError
 from .mesh_data import carry
 from .mesh_files import MeshFile, check_writable, write_file
-from .quality import quality, side_by_side
+from .quality import side_by_side
 from .result import RemeshResult
-from .sizing import Adaptive
 
 __all__ = ["main"]
 
@@ -43,13 +42,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit status: 0, 2 for bad input, 130 after Ctrl-C, 1 where memory or the terminal failed.
+        Exit status: 0, 2 for bad input, 130 after Ctrl-C, 1 where memory or the terminal failed, 3
+        where some meshes of a batch failed.
     """
-    arguments = sys.argv[1:] if argv is None else list(argv)
-    options = parser().parse_args(arguments)
-    options.call = shlex.join(["remeshvec", *arguments])
+    words = sys.argv[1:] if argv is None else list(argv)
+    if words[:1] == ["batch"]:  # a file of this name is ./batch
+        from . import _batch_command
+
+        return _ends(_batch_command.run, _batch_command.parsed(words[1:]))
+    options = parser().parse_args(words)
+    options.call = shlex.join(["remeshvec", *words])
+    return _ends(_run, options)
+
+
+def _ends(work: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
+    """Do the work; return the exit status, and say what went wrong in one line."""
     try:
-        _run(options)
+        status = work(options)
         sys.stdout.flush()
     except RemeshvecError as error:
         return _failed(str(error), EXIT_ERROR)
@@ -60,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of a pipe has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_FAILURE
-    return 0
+    return status
 
 
 def _failed(reason: str, status: int) -> int:
@@ -68,7 +77,7 @@ def _failed(reason: str, status: int) -> int:
     return status
 
 
-def _run(options: argparse.Namespace) -> None:
+def _run(options: argparse.Namespace) -> int:
     """Do everything that the arguments ask for."""
     _check_outputs(options)
     seconds: dict[str, float] = {}
@@ -103,6 +112,7 @@ def _run(options: argparse.Namespace) -> None:
         from . import viz
 
         viz.show((mesh.V, mesh.F), (result.V, result.F), up=options.up)
+    return 0
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
@@ -138,15 +148,8 @@ def _outputs(options: argparse.Namespace) -> list[str]:
 
 def _length(options: argparse.Namespace, mesh: MeshFile) -> Any:
     """Return the target length, None for the library's default or where a count is asked for."""
-    if options.adaptive is not None:
-        return Adaptive(options.adaptive, options.min_length, options.max_length)
-    if options.min_length is not None or options.max_length is not None:
-        raise OptionError("--min-length and --max-length go with --adaptive")
-    if options.lengths is not None:
-        return read_array(options.lengths, whole=False)
-    if options.length is not None or options.l_factor == DEFAULT_FACTOR:
-        return options.length
-    return options.l_factor * quality(mesh.V, mesh.F).edge_mean
+    length = target_length(options, mesh)
+    return length if options.lengths is None else read_array(options.lengths, whole=False)
 
 
 # Arguments that name files of indices, with the numbers in a row.
@@ -158,36 +161,15 @@ _ARRAYS = {
     "face_labels": 1,
 }
 
-# Arguments that the library knows under the same name.
-_SAME = (
-    "iterations",
-    "tol",
-    "split",
-    "collapse",
-    "foldover",
-    "sliver_check",
-    "fit",
-    "threads",
-    "gradation",
-    "n_faces",
-    "n_vertices",
-    "max_deviation",
-)
-
 
 def _library_options(options: argparse.Namespace) -> dict[str, Any]:
-    """Return those options that were given, so that the presets decide on the others."""
-    given = {name: getattr(options, name) for name in _SAME}
-    given["project"] = False if options.no_project else None
+    """Return those options that were given, with the arrays that they name."""
+    given = given_options(options)
     for name, columns in _ARRAYS.items():
         path = getattr(options, name)
-        given[name] = None if path is None else read_array(path, columns)
-    chosen = {
-        "preset": options.preset,
-        "feature_angle": options.feature_angle,
-        "boundary": options.boundary,
-    }
-    return chosen | {k: v for k, v in given.items() if v is not None}
+        if path is not None:
+            given[name] = read_array(path, columns)
+    return given
 
 
 @contextmanager

@@ -23,9 +23,19 @@ from .result import RemeshResult
 if TYPE_CHECKING:
     from typing import Unpack
 
-__all__ = ["check_data_writable", "read_data", "remesh_file", "with_kept", "write_data"]
+__all__ = [
+    "COMMON_SUFFIXES",
+    "check_data_writable",
+    "read_data",
+    "remesh_file",
+    "with_kept",
+    "write_data",
+]
 
 PATHS = str | os.PathLike[str]
+
+# What patterns look for; files of other suffixes are read if they are named.
+COMMON_SUFFIXES = (*SUFFIXES, ".vtk", ".vtu", ".vtp", ".msh", ".xdmf", ".glb", ".gltf")
 
 
 def remesh_file(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 __all__ = [
+    "BatchError",
     "MeshFormatError",
     "MeshInputError",
     "OptionError",
     "RemeshvecError",
     "SingularSystemError",
+    "WorkerError",
 ]
 
 
@@ -29,3 +31,30 @@ class MeshFormatError(RemeshvecError, ValueError):
 
 class SingularSystemError(RemeshvecError, ValueError):
     """A linear system has no single solution; names what is missing (fixed vertices, a finite entry)."""
+
+
+class WorkerError(RemeshvecError, RuntimeError):
+    """A worker process died, took too long, or could not exchange its input or result."""
+
+
+class BatchError(RemeshvecError, RuntimeError):
+    """An item of a batch failed; names the item, and is raised from what went wrong with it.
+
+    Attributes
+    ----------
+    index : int
+        Which item, counted from 0.
+    name : str
+        Its path, or what it is.
+    """
+
+    def __init__(self, index: int, name: str, reason: str) -> None:
+        super().__init__(
+            index, name, reason
+        )  # all of them: exceptions are pickled by their arguments
+        self.index = index
+        self.name = name
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"item {self.index} ({self.name}) failed: {self.reason}"

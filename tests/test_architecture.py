@@ -34,11 +34,13 @@ LEVELS = {
         "laplacians", "solver", "motion", "fairing", "editing", "multiresolution", "smoothing",
         "_file_guards", "_ply_guard", "_mesh_writers", "mesh_files",
         "_obj_data", "_ply_data", "_foreign_files", "data_files", "pyvista_accessor",
+        "_serving", "_workers", "_progress",
     ],
     7: [
         "evolver", "evolver.energies", "evolver.problem", "evolver.minimize",
         "evolver.necks", "evolver.evolve", "evolver.errors", "evolver.surface_evolver",
-        "viz", "html_page", "_page_views", "_page_charts", "_arguments", "_array_files", "cli",
+        "viz", "html_page", "_page_views", "_page_charts", "_arguments", "_array_files",
+        "batch", "_batch_files", "_batch_table", "_batch_command", "cli",
     ],
     8: ["__main__"],
 }  # fmt: skip
@@ -78,11 +80,13 @@ SIDEWAYS = {
     ("_ply_guard", "_file_guards"),
     *(("data_files", name) for name in ("_foreign_files", "_obj_data", "_ply_data", "mesh_files")),
     ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
+    ("_workers", "_serving"),
     ("evolver.problem", "evolver.energies"), ("evolver.minimize", "evolver.problem"),
     ("evolver.necks", "evolver.energies"),
     *(("evolver.surface_evolver", f"evolver.{name}") for name in ("errors", "minimize", "problem")),
     *(("evolver.evolve", f"evolver.{name}") for name in ("energies", "minimize", "necks", "problem")),
-    ("cli", "_arguments"), ("cli", "_array_files"), ("cli", "viz"), ("cli", "html_page"),
+    *(("cli", name) for name in ("_arguments", "_array_files", "_batch_command", "html_page", "viz")),
+    *(("_batch_command", name) for name in ("_arguments", "_batch_files", "_batch_table", "batch")),
     ("html_page", "_page_charts"), ("html_page", "_page_views"), ("_page_views", "viz"),
 }  # fmt: skip
 LEVEL = {name: level for level, names in LEVELS.items() for name in names}
