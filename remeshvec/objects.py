@@ -6,6 +6,7 @@ arrays and what the mesh carries; its ``wrap`` makes a new object of the same ty
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -36,6 +37,8 @@ def read_object(mesh: Any) -> MeshData:
     for knows, read in _KINDS:
         if knows(mesh):
             return read(mesh)
+    if isinstance(mesh, str | os.PathLike):
+        raise MeshInputError(f"{mesh} is a path: remesh_file remeshes files, read_mesh reads them")
     raise MeshInputError(
         f"{type(mesh).__module__}.{type(mesh).__qualname__} is no mesh that is known here; "
         "give V and F, or an object of trimesh, pyvista, meshio or open3d"

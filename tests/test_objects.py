@@ -8,7 +8,7 @@ import pytest
 import textured
 import zoo
 
-from remeshvec import MeshInputError, OptionError, RemeshResult, remesh
+from remeshvec import MeshInputError, OptionError, RemeshResult, remesh, remesh_many
 from remeshvec.mesh_data import split_vertices
 
 V, F, UV = textured.cube(4)
@@ -269,6 +269,20 @@ def test_result_beside_the_object():
         remesh(V, F, L, return_result=True)
 
 
+def test_batches_of_objects():
+    trimesh = pytest.importorskip("trimesh")
+    mesh = trimesh.Trimesh(V, F, process=False, vertex_attributes={"x": V[:, 0]})
+    alone = remesh(mesh, L)
+    for item in remesh_many([mesh, (V, F), mesh], L, workers=2):
+        if item.index == 1:
+            assert np.array_equal(item.result.V, alone.vertices)
+            uv = item.result.transfer(UV, on="corners")
+            assert uv.shape == (len(item.result.F), 3, 2)
+        else:
+            assert type(item.result) is trimesh.Trimesh
+            assert np.array_equal(item.result.vertex_attributes["x"], alone.vertex_attributes["x"])
+
+
 def test_objects_take_all_options():
     trimesh = pytest.importorskip("trimesh")
     mesh = trimesh.Trimesh(V, F, process=False)
@@ -290,6 +304,8 @@ def test_objects_take_all_options():
         (lambda m: remesh(m, L, face_labels="part"), OptionError, "face_labels: there are no data"),
         (lambda m: remesh(object(), L), MeshInputError, "object is no mesh that is known"),
         (lambda m: remesh(None), MeshInputError, "NoneType is no mesh"),
+        (lambda m: remesh("part.obj", 0.1), MeshInputError, "part.obj is a path: remesh_file"),
+        (lambda m: remesh(V, F, "size"), OptionError, "L "),
     ],
 )
 def test_wrong_calls_are_named(call, error, message):
