@@ -36,6 +36,9 @@ IntArray = NDArray[np.int64]
 # farther from them than this share of the mean target length.
 _TRUST = 0.05
 
+# Vertices that are on the input are found within this distance, in a frame of an extent of 1 to 2.
+_NEAR = 1e-10
+
 
 @dataclass(frozen=True)
 class Output:
@@ -62,7 +65,8 @@ def locate(mesh: Mesh, reference: Reference, on_input: bool, parallel: bool) -> 
         looked for beyond where a walk leads.
     """
     trust = np.inf if on_input else _TRUST * float(mesh.X[:, 3].mean())
-    return locate_vertices(mesh, make_blocks(mesh), reference, trust, parallel)
+    near = _NEAR if on_input else None
+    return locate_vertices(mesh, make_blocks(mesh), reference, trust, parallel, near)
 
 
 def extract(

@@ -233,50 +233,72 @@ def remesh(
     ----------
     Botsch and Kobbelt, A Remeshing Approach to Multiresolution Modeling, SGP 2004, section 4.
     """
-    given = {k: x for k, x in locals().items() if k not in ("V", "F", "L", "return_result")}
+    how: dict[str, Any] = {
+        "iterations": iterations,
+        "tol": tol,
+        "split": split,
+        "collapse": collapse,
+        "foldover": foldover,
+        "sliver_check": sliver_check,
+        "project": project,
+        "untangle_angle": untangle_angle,
+        "fit": fit,
+        "max_deviation": max_deviation,
+        "threads": threads,
+    }
+    wishes: dict[str, Any] = {
+        "feature_angle": feature_angle,
+        "boundary": boundary,
+        "feature_edges": feature_edges,
+        "fixed_vertices": fixed_vertices,
+        "fixed_faces": fixed_faces,
+        "face_labels": face_labels,
+        "preserve": preserve,
+        "selection": selection,
+    }
+    rest: dict[str, Any] = {
+        "preset": preset,
+        "gradation": gradation,
+        "n_faces": n_faces,
+        "n_vertices": n_vertices,
+        "max_faces": max_faces,
+        "callback": callback,
+    }
     if not _are_arrays(V, F):
-        return _remesh_object(V, *_only_length(F, L), given, return_result)
+        return _remesh_object(V, *_only_length(F, L), {**how, **wishes, **rest}, return_result)
     if return_result:
         raise OptionError("return_result goes with mesh objects; arrays give the result anyway")
+    arrays = to_numpy(V) if is_tensor(V) else V, to_numpy(F) if is_tensor(F) else F
+    result = _remesh_arrays(*arrays, L, how, wishes, **rest)
     if is_tensor(V) or is_tensor(F):
-        result = remesh(to_numpy(V), to_numpy(F), L, **given)
         result.V, result.F = like(V, result.V), like(F, result.F)
-        return result
+    return result
+
+
+def _remesh_arrays(
+    V: Any,
+    F: Any,
+    L: Any,
+    how: dict[str, Any],
+    wishes: dict[str, Any],
+    *,
+    preset: str,
+    gradation: float,
+    n_faces: int | None,
+    n_vertices: int | None,
+    max_faces: int,
+    callback: Callback | None,
+) -> RemeshResult:
+    """Remesh arrays: check, prepare, sweep, extract."""
     watch = Stopwatch()
-    options = make_options(
-        preset,
-        {
-            "iterations": iterations,
-            "tol": tol,
-            "split": split,
-            "collapse": collapse,
-            "foldover": foldover,
-            "sliver_check": sliver_check,
-            "project": project,
-            "untangle_angle": untangle_angle,
-            "fit": fit,
-            "max_deviation": max_deviation,
-            "threads": threads,
-        },
-    )
+    options = make_options(preset, how)
     count = _wanted_count(L, n_faces, n_vertices)
     sizing = Sizing(L, check_gradation(gradation), positive_count(max_faces, "max_faces"))
     if callback is not None and not callable(callback):
         raise OptionError(f"callback must be callable; got {callback!r}")
     with watch.time("check"):
         vertices, faces = as_mesh(V, F)
-        constraints = make_constraints(
-            len(vertices),
-            faces,
-            feature_angle=feature_angle,
-            boundary=boundary,
-            feature_edges=feature_edges,
-            fixed_vertices=fixed_vertices,
-            fixed_faces=fixed_faces,
-            face_labels=face_labels,
-            preserve=preserve,
-            selection=selection,
-        )
+        constraints = make_constraints(len(vertices), faces, **wishes)
     with compile_notice(), thread_scope(options.threads) as may_run:
         sweeps = Sweeps(options, watch, may_run, callback)
         with watch.time("build"):

@@ -325,8 +325,10 @@ def test_unexpected_errors_say_where_they_come_from():
         def __len__(self):
             raise RuntimeError
 
-    found = list(remesh_many([object(), zoo.grid(4, 4)], workers=2, on_error="collect"))
-    assert isinstance(found[0].error, TypeError) and found[1].error is None
+    found = list(remesh_many([Odd(), zoo.grid(4, 4)], workers=2, on_error="collect"))
+    assert isinstance(found[0].error, WorkerError) and found[1].error is None
+    found = list(remesh_many([zoo.grid(4, 4)], lambda points: 1 / 0, workers=2, on_error="collect"))
+    assert isinstance(found[0].error, ZeroDivisionError)
     assert "_remesh_here" in "".join(found[0].error.__notes__)
 
 

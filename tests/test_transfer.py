@@ -335,3 +335,19 @@ def five_by_five():
 def test_wrong_data_to_preserve_are_named(preserve, message):
     with pytest.raises(OptionError, match=message):
         remesh(*five_by_five(), 0.2, preserve=preserve)
+
+
+@pytest.mark.parametrize("name", ["planar_delaunay", "thin_sheet", "icosphere"])
+def test_births_are_found_where_walks_get_stuck(name):
+    """Vertices that were put back, because faces would have folded, lie where a walk may not end."""
+    V, F = zoo.ZOO[name].make()
+    for seed in range(8):
+        A, B = zoo.upsampled(V, F, noise=0.2, seed=seed)
+        result = remesh(A, B, 1.5 * edges_mean(A, B))
+        import igl
+
+        points = np.ascontiguousarray(result.V)
+        on_input = igl.point_mesh_squared_distance(points, A, B)[0] < 1e-24
+        off = np.linalg.norm(result.transfer(A) - result.V, axis=1)
+        assert on_input.mean() > 0.98
+        assert off[on_input].max() < 1e-9

@@ -25,7 +25,7 @@ from .._types import (
     Mesh,
     Tree,
 )
-from ..bvh import STACK, Surface, closest_face, point_on_face, search_face, walk_to_face
+from ..bvh import STACK, Surface, point_on_face, search_face, walk_to_face
 from ..edge_sets import per_block
 from ..geometry import face_vector
 from ..halfedge import following, previous
@@ -77,11 +77,18 @@ def project_curves(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: b
 
 
 def locate_vertices(
-    mesh: Mesh, blocks: Blocks, reference: Reference, trust: float, parallel: bool
+    mesh: Mesh,
+    blocks: Blocks,
+    reference: Reference,
+    trust: float,
+    parallel: bool,
+    near: float | None = None,
 ) -> FloatArray:
     """Find where every vertex lies without moving it; sets ``mesh.birth``.
 
-    ``trust`` as in `project_vertices`, but a length: inf for vertices that were just projected.
+    ``trust`` as in `project_vertices`, but a length: inf for vertices that were just projected. For
+    vertices that a walk leaves farther away than ``near``, by default ``trust``, a place within ``near``
+    is looked for in the whole patch: most lie on the reference, some were put back where they were.
 
     Returns
     -------
@@ -97,6 +104,7 @@ def locate_vertices(
         reference.tree,
         *reference[1:4],
         trust * trust,
+        (trust if near is None else near) ** 2,
         mesh.birth,
         barycentric,
     )
@@ -165,7 +173,7 @@ def _project_curves(span, mesh, blocks, X_in, origin, beside, X, birth):
 
 
 @threaded(per_block)
-def _locate(span, mesh, blocks, tree, X_in, origin, beside, trust, birth, barycentric):
+def _locate(span, mesh, blocks, tree, X_in, origin, beside, trust, near, birth, barycentric):
     for k in range(span[0], span[1]):
         stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
@@ -174,7 +182,11 @@ def _locate(span, mesh, blocks, tree, X_in, origin, beside, trust, birth, baryce
             x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
             hint = np.int64(birth[v])
             if mesh.kind[v] < CURVE:
-                f, s, t, _ = closest_face(tree, x, y, z, hint // 3, trust, stack)
+                f, s, t, d = walk_to_face(tree, x, y, z, hint // 3)
+                if d > near:
+                    g, gs, gt, gd = search_face(tree, x, y, z, f, 0.0, 0.0, 0.0, stack)
+                    if d > trust or gd <= near:
+                        f, s, t = g, gs, gt
                 birth[v] = 3 * f
                 barycentric[v, 0] = 1.0 - s - t
                 barycentric[v, 1] = s
