@@ -25,6 +25,7 @@ _READ_ONLY = (".3mf", ".dae")  # written without what they carry
 
 # Formats of meshio that hold any data on points and cells.
 _WITH_DATA = ("vtk", "vtu", "xdmf", "gmsh22")
+_COLUMNS: dict[str | None, tuple[int, ...]] = {"xdmf": (1, 3, 6, 9), "gmsh22": (1, 3, 9)}
 
 _SCENE = "scene:geometry"
 
@@ -153,9 +154,28 @@ def write_foreign(path: Path, data: MeshData) -> tuple[bytes, set[str]]:
             _polydata(library, data).save(file)
         else:
             kind = _writer(library, suffix)
-            _write_meshio(library, write_meshio(library.Mesh, _plain_names(data)), file, kind)
-            held = held if kind in _WITH_DATA else set()
+            data = _plain_names(data)
+            lost = _fit(data, kind)
+            _write_meshio(library, write_meshio(library.Mesh, data), file, kind)
+            held = held - lost if kind in _WITH_DATA else set()
         return Path(file).read_bytes(), held
+
+
+def _fit(data: MeshData, kind: str | None) -> set[str]:
+    """Bring data into a shape that a format of meshio knows; returns the names of what cannot be."""
+    lost = set()
+    for table in (data.on_vertices, data.on_faces):
+        for name, values in list(table.items()):
+            flat = values.reshape(len(values), -1) if values.ndim > 1 else values
+            if flat.ndim == 2 and flat.shape[1] == 2:  # VTK and Gmsh have vectors of three
+                flat = np.column_stack([flat, np.zeros(len(flat), flat.dtype)])
+            columns = 1 if flat.ndim == 1 else flat.shape[1]
+            small = flat.dtype.kind in "iub" and flat.dtype.itemsize < 4
+            table[name] = flat.astype(np.int32) if small else flat  # XDMF knows none of less
+            if flat.dtype.kind not in "fiub" or columns not in _COLUMNS.get(kind, (columns,)):
+                lost.add(name)
+                del table[name]
+    return lost
 
 
 def _write_meshio(meshio: Any, mesh: Any, file: str, kind: str | None) -> None:
@@ -230,8 +250,9 @@ def _trimesh(trimesh: Any, part: Any, data: MeshData) -> Any:
     elif "color" in looks.on_faces and (part is None or part.visual.kind == "face"):
         mesh.visual.face_colors = _bytes(looks.on_faces["color"])
     for name, values in looks.on_vertices.items():
-        if name not in ("uv", "color", "normal"):
-            mesh.vertex_attributes[name if name.startswith("_") else f"_{name}"] = values
+        if name not in ("uv", "color", "normal") and values.dtype.kind in "fiub":
+            plain = values.astype(np.uint8) if values.dtype.kind == "b" else values
+            mesh.vertex_attributes[name if name.startswith("_") else f"_{name}"] = plain
     return mesh
 
 

@@ -145,6 +145,23 @@ def test_formats_with_fields(tmp_path, suffix):
     assert_groups(out)
 
 
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".msh", ".xdmf", ".vtp", ".glb"])
+def test_data_of_all_shapes_are_written_or_named(tmp_path, suffix):
+    for library in {".vtp": ["pyvista"], ".glb": ["trimesh"]}.get(suffix, ["meshio", "h5py"]):
+        pytest.importorskip(library)
+    data = loaded_cube()
+    n = len(data.V)
+    data.on_vertices |= {"pair": data.V[:, :2].copy(), "tensor": np.ones((n, 3, 3))}
+    data.on_vertices |= {"four": np.ones((n, 4), np.float32), "truth": data.V[:, 0] > 0}
+    names = {*data.on_vertices, *data.on_faces, *data.on_corners}
+    lost = set(write_data(tmp_path / f"a{suffix}", data))
+    out, notices = read_data(tmp_path / f"a{suffix}")
+    read = {name.lstrip("_") for name in (*out.on_vertices, *out.on_faces, "visual:colour")}
+    found = {name for name in names - lost if name in read or name in ("uv", "color")}
+    assert not notices and found == names - lost
+    assert_field(out, "_height" if suffix == ".glb" else "height")
+
+
 @pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".vtp", ".glb"])
 def test_texture_goes_from_obj_to_formats_that_hold_it_at_vertices(tmp_path, suffix):
     library = {".vtp": "pyvista", ".glb": "trimesh"}.get(suffix, "meshio")

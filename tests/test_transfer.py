@@ -161,10 +161,36 @@ def test_charts_stay_apart_on_every_shape(name, options):
         assert np.array_equal(out[:, 0].round().astype(int), result.transfer(chart, on="faces"))
 
 
-@pytest.mark.parametrize("seed", range(4))
+def test_sheets_that_meet_keep_their_data():
+    V, F = zoo.three_half_discs()
+    middle = V[F].mean(axis=1)
+    sheet = np.rint(np.arctan2(middle[:, 2], middle[:, 1]) / (2 * np.pi / 3)).astype(int)
+    values = np.repeat(sheet[:, None], 3, axis=1)
+    assert len(np.unique(sheet)) == 3
+    for factor in (0.2, 0.4, 1.0):
+        result = remesh(V, F, factor * edges_mean(V, F), feature_angle=None)
+        out = result.transfer(values, on="corners")
+        assert np.array_equal(out.min(axis=1), out.max(axis=1))
+        assert np.array_equal(out[:, 0], result.transfer(sheet, on="faces"))
+
+
+def test_cuts_that_leave_a_vertex_close_together():
+    """One chart around a vertex with three curved cuts, 12 degrees apart: directions alone mislead."""
+    V, F, values, sector = textured.star()
+    for L in (0.08, 0.15, 0.25):
+        result = remesh(V, F, L, preserve=values, feature_angle=None)
+        out = result.transfer(values, on="corners")
+        at_centre = np.linalg.norm(result.V[result.F], axis=2) < 1e-9
+        faces = np.flatnonzero(at_centre.any(axis=1))
+        assert len(faces) >= 3
+        middle = result.V[result.F[faces]].mean(axis=1)
+        assert np.allclose(out[at_centre], sector(middle), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(10))
 def test_rough_surfaces_keep_their_sides(seed):
     V, F, uv = textured.torus()
-    V = V + np.random.default_rng(seed).normal(size=V.shape) * 0.06
+    V = V + np.random.default_rng(seed).normal(size=V.shape) * 0.1
     for factor in (0.4, 0.9):
         result = remesh(V, F, factor * 0.3, preserve=uv)
         out = result.transfer(uv, on="corners")

@@ -61,6 +61,37 @@ def slit(n=12):
     return V, F, values
 
 
+CUTS, TWIST = np.radians([0.0, 12.0, 24.0]), 1.2
+
+
+def star(rings=10):
+    """A disc with three cuts from its centre that turn with the radius, and end before the rim.
+
+    The data are the number of the sector between two cuts, up to where they end. Returns the sector of
+    points too.
+    """
+    angles = np.radians([0, 12, 24, *range(40, 360, 20)])
+    radii = np.arange(1, rings + 1) / rings
+    turned = angles[None, :] + TWIST * radii[:, None]
+    ring = np.stack([np.cos(turned), np.sin(turned)], axis=2) * radii[:, None, None]
+    V = np.concatenate([np.zeros((1, 2)), ring.reshape(-1, 2)])
+    m = len(angles)
+    k, after = np.arange(m), (np.arange(m) + 1) % m
+    F = [np.stack([0 * k, 1 + k, 1 + after], axis=1)]
+    for r in range(rings - 1):
+        a, b = 1 + m * r + k, 1 + m * r + after
+        F += [np.stack([a, a + m, b + m], axis=1), np.stack([a, b + m, b], axis=1)]
+    V, F = np.column_stack([V, np.zeros(len(V))]), np.concatenate(F)
+
+    def sector(points):
+        r = np.linalg.norm(points, axis=-1)
+        angle = (np.arctan2(points[..., 1], points[..., 0]) - TWIST * r) % (2 * np.pi)
+        return np.searchsorted(CUTS, angle).astype(float)
+
+    fades = np.clip((0.75 - np.linalg.norm(V[F], axis=2)) / 0.2, 0, 1)
+    return V, F, sector(V[F].mean(axis=1))[:, None] * fades, sector
+
+
 def split_at_seams(V, F, uv):
     """The same with a vertex for every texture coordinate, as most file formats have it."""
     keys = np.concatenate([F.reshape(-1, 1), np.rint(uv.reshape(-1, 2) * 1e9)], axis=1)
