@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ._workers import run_in_processes
 from .mesh_data import MeshData, split_vertices
 from .meshio_data import read_meshio, write_meshio
 from .objects import COLOUR, UV, read_pyvista, read_trimesh
@@ -79,7 +80,18 @@ def _writer(meshio: Any, suffix: str) -> str | None:
 
 def read_foreign(path: Path) -> tuple[MeshData, list[str]]:
     """Read a file with the library that knows it; returns notices of what was left out, too."""
-    name, library = _library(path.suffix.lower())
+    name, _ = _library(path.suffix.lower())
+    if name != "pyvista":
+        return _read_here(name, path)
+    # VTK ends the process where a damaged file asks for more memory than there is.
+    (outcome,) = run_in_processes(_read_polydata, [path], None, 1)
+    if outcome.error is not None:
+        raise outcome.error
+    return outcome.value
+
+
+def _read_here(name: str, path: Path) -> tuple[MeshData, list[str]]:
+    library = importlib.import_module(name)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)  # that is how pyvista tells errors of VTK
         if name == "trimesh":
@@ -90,7 +102,13 @@ def read_foreign(path: Path) -> tuple[MeshData, list[str]]:
         warnings.simplefilter("always")
         read = {"trimesh": _read_scene, "pyvista": read_pyvista, "meshio": read_meshio}[name]
         data = read(found)
+    data.wrap = None
     return data, [str(warning.message) for warning in noticed]
+
+
+def _read_polydata(path: Path, _: None) -> tuple[MeshData, list[str]]:
+    """Read with pyvista, in a process of its own."""
+    return _read_here("pyvista", path)
 
 
 def _read_meshio(meshio: Any, path: Path) -> Any:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._check import as_mesh
 from ._foreign_files import can_write, read_foreign, write_foreign
 from ._obj_data import has_obj_data, obj_bytes, read_obj_data
 from ._ply_data import ply_bytes, read_ply_data
@@ -94,7 +95,9 @@ def read_data(path: PATHS) -> tuple[MeshData, list[str]]:
         return data, notices
     try:
         _check_there(path)
-        return read_foreign(path)
+        data, notices = read_foreign(path)
+        as_mesh(data.V, data.F)
+        return data, notices
     except Exception as error:  # of whatever kind: libraries raise all sorts on a broken file
         raise MeshFormatError(f"cannot read {path}: {reason(error)}") from error
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ._check import as_mesh
 from .errors import MeshInputError
 from .mesh_data import Data, MeshData
 from .meshio_data import is_meshio, read_meshio
@@ -36,7 +37,9 @@ def read_object(mesh: Any) -> MeshData:
     """
     for knows, read in _KINDS:
         if knows(mesh):
-            return read(mesh)
+            data = read(mesh)
+            as_mesh(data.V, data.F)  # before data are looked up by faces
+            return data
     if isinstance(mesh, str | os.PathLike):
         raise MeshInputError(f"{mesh} is a path: remesh_file remeshes files, read_mesh reads them")
     raise MeshInputError(
