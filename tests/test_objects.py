@@ -53,6 +53,15 @@ def test_trimesh_with_texture_and_attributes():
     assert merged.is_watertight and np.isclose(merged.volume, 8)
 
 
+def test_trimesh_with_a_seam_that_is_no_crease():
+    trimesh = pytest.importorskip("trimesh")
+    A, B, uv = textured.split_at_seams(*textured.cylinder())
+    visual = trimesh.visual.TextureVisuals(uv=uv)
+    out = remesh(trimesh.Trimesh(A, B, process=False, visual=visual), 0.25)
+    found = np.asarray(out.visual.uv)[out.faces]
+    assert np.isclose(areas(found).sum(), 1.0) and (areas(found) > 0).all()
+
+
 @pytest.mark.parametrize("kind", ["vertex", "face"])
 def test_trimesh_with_colours(kind):
     trimesh = pytest.importorskip("trimesh")
@@ -171,6 +180,8 @@ def test_meshio_with_blocks_sets_and_groups():
     for i, block in enumerate(out.cells):
         middle = out.points[block.data].mean(axis=1)
         assert ((middle[:, 0] < 0.5) == (i == 0)).all()
+        x = out.points[block.data][..., 0]
+        assert (x <= 0.5 + 1e-12).all() if i == 0 else (x >= 0.5 - 1e-12).all()
         assert (out.cell_data["gmsh:physical"][i] == 7 + i).all()
         low = np.flatnonzero(middle[:, 1] < 0.5)
         assert np.array_equal(out.cell_sets["low"][i], low)
