@@ -28,8 +28,8 @@ IntArray = NDArray[np.int64]
 Births = tuple[NDArray[Any], FloatArray]
 
 # How candidates for the side of a corner compare: whatever lies in another patch is wrong, an edge of
-# the same curve is right, one with the same ends even more so; then the direction decides.
-_WRONG_PATCH, _SAME_CURVE, _SAME_ENDS = -16.0, 4.0, 2.0
+# the same curve is right; then the direction decides.
+_WRONG_PATCH, _SAME_CURVE = -16.0, 4.0
 
 _ROUND = 1 << 20  # bound for walks around a vertex
 _ROUNDS = 8  # of moves to the own side of a curve
@@ -98,8 +98,6 @@ def _edges_beside(p: Provenance, h: IntArray, birth: IndexArray) -> IntArray:
     of_edge = np.full(reference.origin.size, -2)
     of_edge[p.features] = curves[p.names]
     score += _SAME_CURVE * (of_edge[edge] == curve[row])
-    end = np.where(mesh.kind[w] == FIXED, reference.origin[birth[w]], -1)
-    score += _SAME_ENDS * (b == end[row])
     order = np.lexsort((edge, score, row))
     last = np.flatnonzero(np.r_[row[order][1:] != row[order][:-1], True])
     best = birth[v].astype(np.int64)
