@@ -97,29 +97,22 @@ class Constraints:
     ) -> BoolArray:
         """Half-edges across which the data on corners differ, at one end or both."""
         h = np.flatnonzero(mesh.twin > np.arange(len(mesh.twin)))
-        pairs = []
-        for v, ours, theirs in (
-            (mesh.origin[h], h // 3, mesh.twin[h] // 3),
-            (ends_of(mesh.origin, h)[1], h // 3, mesh.twin[h] // 3),
-        ):
-            places = []
-            for face in (face_source[ours], face_source[theirs]):
-                corners = self.F[face] if same is None else same[self.F[face]]
-                places.append((face, (corners == vertex_source[v][:, None]).argmax(axis=1)))
-            pairs.append(places)
+        t = mesh.twin[h]
         is_jump = np.zeros(len(h), np.bool_)
-        for values in self.on_corners:
-            last = values.shape[1] - 1
-            near = 0.0 if values.dtype.kind not in "fc" else _NEAR * np.ptp(values, axis=(0, 1))
-            for (f, c), (g, d) in pairs:
-                one, other = values[f, np.minimum(c, last)], values[g, np.minimum(d, last)]
-                if values.dtype.kind in "fc":
-                    is_jump |= (abs(one - other) > near).any(axis=1)
-                else:
-                    is_jump |= (one != other).any(axis=1)
+        for v in ends_of(mesh.origin, h):
+            ours, theirs = (
+                self._corners(face_source[side // 3], vertex_source[v], same) for side in (h, t)
+            )
+            for values in self.on_corners:
+                is_jump |= _differ(values, ours, theirs)
         jumps = np.zeros(len(mesh.twin), np.bool_)
-        jumps[h[is_jump]] = jumps[mesh.twin[h[is_jump]]] = True
+        jumps[h[is_jump]] = jumps[t[is_jump]] = True
         return jumps
+
+    def _corners(self, face: NDArray[Any], v: IndexArray, same: Any) -> NDArray[np.int64]:
+        """Corners ``3 * face + c`` of the input at vertices of faces."""
+        corners = self.F[face] if same is None else same[self.F[face]]
+        return np.asarray(3 * face + (corners == v[:, None]).argmax(axis=1))
 
 
 def _sides(
@@ -227,9 +220,23 @@ def _corner_data(preserve: Any, m: int) -> list[NDArray[Any]]:
                 f"{name} must hold one entry a corner, shape ({m}, 3, ...), or one a face, shape "
                 f"({m},); got {array.shape}"
             )
+        if array.dtype.kind == "c":
+            arrays[-1] = np.concatenate([arrays[-1].real, arrays[-1].imag], axis=2)
         if array.dtype.kind in "fc" and not np.isfinite(array).all():
             raise OptionError(f"{name} holds NaN or infinity, which have no jumps")
     return arrays
+
+
+def _differ(
+    values: NDArray[Any], one: NDArray[np.int64], two: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Tell where data (m, 3, k), or (m, 1, k), differ between corners."""
+    step = values.shape[1]
+    flat = values.reshape(-1, values.shape[2])
+    a, b = (flat[corner // 3 * step + np.minimum(corner % 3, step - 1)] for corner in (one, two))
+    if values.dtype.kind != "f":
+        return np.asarray((a != b).any(axis=1))
+    return np.asarray((abs(a - b) > _NEAR * np.ptp(values, axis=(0, 1))).any(axis=1))
 
 
 def _angle(value: Any) -> float | str | None:

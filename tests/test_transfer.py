@@ -279,6 +279,10 @@ def test_preserve_takes_several_arrays_and_near_equals():
     assert np.array_equal(plain.V, remesh(V, F, 0.4, preserve=noisy, feature_angle=None).V)
     both = remesh(V, F, 0.4, preserve=[uv, labels], feature_angle=None)
     assert len(both.feature_edges) > len(plain.feature_edges)
+    as_complex = remesh(V, F, 0.4, preserve=uv @ [1, 1j], feature_angle=None)
+    assert np.array_equal(as_complex.V, plain.V)
+    named = remesh(V, F, 0.4, preserve=[uv, np.array(["low", "high"])[labels]], feature_angle=None)
+    assert np.array_equal(both.V, named.V)
     bool_labels = remesh(V, F, 0.4, preserve=(uv, labels == 1), feature_angle=None)
     assert np.array_equal(both.V, bool_labels.V)
 
