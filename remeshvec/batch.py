@@ -6,7 +6,7 @@ import inspect
 import os
 from collections.abc import Iterable, Iterator, Sized
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ._check import positive_count, positive_number
 from ._progress import bar
@@ -15,8 +15,11 @@ from ._workers import Outcome, run_here, run_in_processes
 from .errors import BatchError, OptionError
 from .job import Lengths
 from .mesh_files import MeshFile, read_mesh
-from .remesh import remesh
+from .remesh import RemeshOptions, remesh
 from .result import RemeshResult
+
+if TYPE_CHECKING:
+    from typing import Unpack
 
 __all__ = ["BatchItem", "remesh_many", "warm_up"]
 
@@ -55,7 +58,7 @@ def remesh_many(
     ordered: bool = True,
     progress: bool = False,
     timeout: float | None = None,
-    **options: Any,
+    **options: Unpack[RemeshOptions],
 ) -> Iterator[BatchItem]:
     """Remesh many meshes, in several processes.
 
@@ -106,7 +109,7 @@ def remesh_many(
     >>> for item in remesh_many(paths, 0.1, on_error="collect"):  # doctest: +SKIP
     ...     print(item.name, item.error or len(item.result.F))
     """
-    _check(on_error, options)
+    _check(on_error, options.keys())
     if workers is not None:
         workers = positive_count(workers, "workers")
     if timeout is not None:
@@ -134,12 +137,12 @@ class _Crew(NamedTuple):
     timeout: float | None
 
 
-def _check(on_error: str, options: dict[str, Any]) -> None:
+def _check(on_error: str, options: Iterable[str]) -> None:
     """Refuse here what would fail for every item."""
     if on_error not in ("raise", "collect"):
         raise OptionError(f'on_error must be "raise" or "collect"; got {on_error!r}')
     known = inspect.signature(remesh).parameters.keys() - {"V", "F", "L", "return_result"}
-    unknown = sorted(options.keys() - known)
+    unknown = sorted(set(options) - known)
     if unknown:
         raise OptionError(f"there is no option {', '.join(unknown)}")
 

@@ -1,13 +1,15 @@
 """Options: presets, overrides, and a clear line for what cannot work."""
 
 import dataclasses
+import inspect
 
 import numpy as np
 import pytest
 
-from remeshvec import OptionError
+from remeshvec import OptionError, remesh
 from remeshvec._threads import available_threads
 from remeshvec.options import PRESETS, make_options
+from remeshvec.remesh import RemeshOptions
 
 
 def options(preset="default", **overrides):
@@ -69,6 +71,11 @@ def test_an_angle_asked_for_is_reached_for_by_every_preset():
     assert make_options("fast", {}).untangle_rounds == 0
     asked = make_options("fast", {"untangle_angle": 30})
     assert asked.untangle_rounds == make_options("default", {}).untangle_rounds > 0
+
+
+def test_the_typed_options_are_those_of_the_call():
+    parameters = inspect.signature(remesh).parameters.keys()
+    assert RemeshOptions.__annotations__.keys() == parameters - {"V", "F", "L", "return_result"}
 
 
 def test_fit_can_be_switched_on_and_off():
