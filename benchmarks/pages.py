@@ -262,7 +262,8 @@ def _time(row: Row | None) -> str:
     if row is None:
         return "-"
     if "median" not in row:
-        return "failed" if not row.get("failed", "").startswith("left out") else "too slow"
+        is_slow = row.get("failed", "").startswith(("left out", "no result within"))
+        return "too slow" if is_slow else "failed"
     turns = len(row["seconds"])
     return milliseconds(row["median"]) + (f" ({turns} turns)" if turns < 5 else "")
 
