@@ -286,7 +286,8 @@ def _add_report_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--save-arrays",
         metavar="FILE",
-        help="write births, labels, maps, feature edges, corners and lengths, as .npz",
+        help="write births of vertices, faces and corners, images of the input's vertices, labels, maps, "
+        "feature edges, corners and lengths, as .npz",
     )
     group.add_argument(
         "--picture", metavar="FILE", help="render both meshes side by side (PNG or JPEG)"

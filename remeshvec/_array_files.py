@@ -18,6 +18,11 @@ __all__ = ["read_array", "write_arrays"]
 _SAVED = (
     "birth_face",
     "birth_barycentric",
+    "face_birth",
+    "corner_birth_face",
+    "corner_birth_barycentric",
+    "image_face",
+    "image_barycentric",
     "face_labels",
     "vertex_map",
     "face_map",

@@ -75,6 +75,9 @@ def test_everything_is_saved(asked, capsys):
     with np.load("out.npz") as saved:
         assert saved["face_labels"].shape == (len(F2),) and saved["lengths"].shape == (len(V2),)
         assert np.array_equal(saved["face_map"][40:], np.arange(88))
+        assert np.array_equal(saved["face_birth"][:88], np.arange(40, 128))
+        assert saved["corner_birth_barycentric"].shape == (len(F2), 3, 3)
+        assert saved["image_face"].shape == (len(V),)
     assert np.array_equal(V2[F2[:88]], V[F[40:]])
 
 
