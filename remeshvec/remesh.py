@@ -332,7 +332,7 @@ def _remesh_arrays(
     )  # fmt: skip
     return RemeshResult(
         V2, out.F, report, out.face_labels, out.lengths,
-        Late(partial(vertex_births, out.provenance)),
+        Postponed(partial(vertex_births, out.provenance)),
         Postponed(partial(face_births, out.provenance)),
         Postponed(partial(corner_births, out.provenance)),
         Postponed(partial(images, out.provenance)),

@@ -113,5 +113,5 @@ def all_modules() -> list[ModuleType]:
     import remeshvec
 
     names = [info.name for info in pkgutil.walk_packages(remeshvec.__path__, "remeshvec.")]
-    rim = ("__main__", "viz", "cli")
+    rim = ("__main__", "viz", "cli", "pyvista_accessor")  # the last needs PyVista
     return [importlib.import_module(n) for n in names if n.rsplit(".", 1)[-1] not in rim]

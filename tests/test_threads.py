@@ -6,16 +6,14 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from importlib import import_module
 from pathlib import Path
-from pkgutil import walk_packages
 
 import numba
 import numpy as np
 import pytest
+import strict
 import zoo
 
-import remeshvec
 from remeshvec import _jit, _threads, remesh
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -81,10 +79,8 @@ def eventually(condition):
 
 
 def kernels():
-    for info in walk_packages(remeshvec.__path__, "remeshvec."):
-        if info.name.rsplit(".", 1)[-1] not in ("__main__", "viz", "cli"):
-            found = vars(import_module(info.name)).values()
-            yield from (value for value in found if isinstance(value, _jit.kernel))
+    for module in strict.all_modules():
+        yield from (value for value in vars(module).values() if isinstance(value, _jit.kernel))
 
 
 @needs_jit
