@@ -21,7 +21,7 @@ from ._batch_table import COLUMNS, MEASURES, Row, Table, write_parquet
 from ._progress import bar
 from ._threads import available_threads
 from ._workers import run_here, run_in_processes
-from .batch import warm_up
+from .batch import one_line, warm_up
 from .data_files import check_data_writable, read_data, with_kept, write_data
 from .errors import MeshFormatError, OptionError
 from .mesh_data import carry
@@ -175,7 +175,7 @@ def _work(todo: list[Job], batch: _Batch) -> None:
             if outcome.error is None:
                 row |= outcome.value
             else:
-                row["error"] = _one_line(outcome.error)
+                row["error"] = one_line(outcome.error)
             batch.table.add(row)
             batch.current[row["output"]] = row
     finally:
@@ -212,10 +212,6 @@ def _remesh_file(job: Job, options: argparse.Namespace) -> Row:
         for name, attribute in MEASURES.items():
             row[f"{name}_{when}"] = f"{getattr(measured, attribute):.6g}"
     return row
-
-
-def _one_line(error: Exception) -> str:
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
 
 
 # -- the summary ----------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from .result import RemeshResult
 if TYPE_CHECKING:
     from typing import Unpack
 
-__all__ = ["BatchItem", "remesh_many", "warm_up"]
+__all__ = ["BatchItem", "one_line", "remesh_many", "warm_up"]
 
 
 @dataclass
@@ -187,7 +187,7 @@ def _raising(done: Iterator[BatchItem]) -> Iterator[BatchItem]:
     try:
         for item in done:
             if item.error is not None:
-                raise BatchError(item.index, item.name, _one_line(item.error)) from item.error
+                raise BatchError(item.index, item.name, one_line(item.error)) from item.error
             yield item
     finally:
         done.close()  # type: ignore[attr-defined]  # now: the exception may be held for long
@@ -236,6 +236,7 @@ def _remesh_there(mesh: Any, options: dict[str, Any]) -> Any:
     return result
 
 
-def _one_line(error: Exception) -> str:
+def one_line(error: Exception) -> str:
+    """Name an error and what it says, in one line."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__

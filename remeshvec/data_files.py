@@ -71,9 +71,7 @@ def remesh_file(
 
 def with_kept(data: MeshData, options: Any) -> dict[str, Any]:
     """Return the options, with what the data want to be kept."""
-    given = options.get("preserve")
-    several = given if isinstance(given, list | tuple) else [] if given is None else [given]
-    kept = [*data.preserved(), *several]
+    kept = data.preserved(options.get("preserve"))
     return {**options, "preserve": kept} if kept else dict(options)
 
 

@@ -47,9 +47,10 @@ class MeshData:
     wrap: Callable[[MeshData], Any] | None = None
     extra: dict[str, Any] = field(default_factory=dict)
 
-    def preserved(self) -> list[NDArray[Any]]:
-        """Return the data to be kept, as ``remesh`` takes them for ``preserve``."""
-        return [self.find(name) for name in self.kept]
+    def preserved(self, asked: Any = None) -> list[Any] | None:
+        """Return the data to be kept, and what is asked for besides, as ``remesh`` takes them."""
+        several = asked if isinstance(asked, list | tuple) else [] if asked is None else [asked]
+        return [*map(self.find, self.kept), *several] or None
 
     def find(self, name: str) -> NDArray[Any]:
         """Return data on faces or corners by name; those on vertices as their corners have them."""

@@ -343,9 +343,18 @@ def _remesh_arrays(
 def _are_arrays(V: Any, F: Any) -> bool:
     """Tell two arrays from a mesh and, perhaps, a length."""
     is_length = F is None or isinstance(F, Real | str | Adaptive) or callable(F)
-    is_pair = isinstance(V, tuple | list) and len(V) == 2
     is_array = hasattr(V, "__array__") or isinstance(V, tuple | list)
-    return not is_mesh_object(V) and not (is_length and (is_pair or not is_array))
+    return not (is_mesh_object(V) or _is_pair(V) or (is_length and not is_array))
+
+
+def _is_pair(V: Any) -> bool:
+    """Tell the arrays of a whole mesh from two vertices."""
+    if not isinstance(V, tuple | list) or len(V) != 2:
+        return False
+    try:
+        return all(np.ndim(to_numpy(x)) == 2 for x in V)
+    except ValueError:  # rows of unequal length
+        return False
 
 
 def _only_length(F: Any, L: Any) -> tuple[Any]:
@@ -357,7 +366,7 @@ def _only_length(F: Any, L: Any) -> tuple[Any]:
 
 def _remesh_object(mesh: Any, L: Any, options: Any, return_result: bool) -> Any:
     """Remesh an object, and let the new one carry the same data."""
-    if isinstance(mesh, tuple | list) and len(mesh) == 2:
+    if _is_pair(mesh):
         if return_result:
             raise OptionError("return_result goes with mesh objects; arrays give the result anyway")
         return remesh(mesh[0], mesh[1], L, **options)
@@ -368,7 +377,7 @@ def _remesh_object(mesh: Any, L: Any, options: Any, return_result: bool) -> Any:
     asked = options["preserve"]
     several = asked if isinstance(asked, list | tuple) else [] if asked is None else [asked]
     found = [_named(data, x, "preserve") if isinstance(x, str) else x for x in several]
-    options["preserve"] = [*data.preserved(), *found] or None
+    options["preserve"] = data.preserved(found)
     if isinstance(L, str):
         if L not in data.on_vertices:
             raise OptionError(f"there are no data {L!r} on vertices; {_names(data.on_vertices)}")

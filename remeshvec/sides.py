@@ -273,6 +273,7 @@ def _find_ways(tree, X, vertices, beside, near, face, seen, length):
     """Settle faces in the order of their ways [Dijkstra 1959]; ``near`` holds the starts."""
     faces = np.empty(_NEARBY, np.int64)
     entry = np.empty((_NEARBY, 4))  # the point where the way enters, and its length
+    is_settled = np.empty(_NEARBY, np.bool_)
     for i in range(vertices.size):
         v = vertices[i]
         x, y, z = X[v, 0], X[v, 1], X[v, 2]
@@ -283,18 +284,19 @@ def _find_ways(tree, X, vertices, beside, near, face, seen, length):
         limit = _DETOUR * np.sqrt(limit)
         faces[0] = near[i]
         seen[faces[0]] = i + 1
+        is_settled[0] = False
         size = 1
         best = np.inf
-        for k in range(_NEARBY):
+        for _ in range(_NEARBY):
+            k = size
+            least = np.inf
+            for j in range(size):
+                if not is_settled[j] and entry[j, 3] < least:
+                    least = entry[j, 3]
+                    k = j
             if k == size:
                 break
-            least = k
-            for j in range(k + 1, size):
-                if entry[j, 3] < entry[least, 3]:
-                    least = j
-            faces[k], faces[least] = faces[least], faces[k]
-            for c in range(4):
-                entry[k, c], entry[least, c] = entry[least, c], entry[k, c]
+            is_settled[k] = True
             f = faces[k]
             if f == face[v]:
                 dx, dy, dz = entry[k, 0] - x, entry[k, 1] - y, entry[k, 2] - z
@@ -325,4 +327,5 @@ def _find_ways(tree, X, vertices, beside, near, face, seen, length):
                     entry[size, c] = start + s * (end - start)
                     squared += (entry[size, c] - entry[k, c]) ** 2
                 entry[size, 3] = entry[k, 3] + np.sqrt(squared)
+                is_settled[size] = False
                 size += 1

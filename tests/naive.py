@@ -237,3 +237,32 @@ def closest_on_segment(p, a, b) -> np.ndarray:
 
 def distance_to_mesh(p, V, F) -> float:
     return min(closest_on_triangle(p, *V[list(f)])[1] for f in tuples(F))
+
+
+def ways(tree, start, goal, at, frm, detour, most):
+    """Length of the way from a point over faces to the face of another; the closest face on short ways.
+
+    From every face the way goes on through the point of each edge that is closest to the middle between
+    where it came in and the goal.
+    """
+    reach = detour * np.linalg.norm(frm - at)
+    waiting, seen = [(0.0, start, frm)], {start}
+    best = (np.inf, start)
+    while waiting:
+        length, face, entry = waiting.pop(min(range(len(waiting)), key=lambda k: waiting[k][0]))
+        if face == goal:
+            return length + np.linalg.norm(entry - at), best[1]
+        corners = tree.corners[face].reshape(3, 3)
+        if length <= reach:
+            distance = closest_on_triangle(at, *corners)[1]
+            best = min(best, (distance, face), key=lambda pair: pair[0])
+        for e in range(3):
+            twin = tree.twin[3 * face + e]
+            if twin >= 0 and twin // 3 not in seen and len(seen) < most:
+                seen.add(twin // 3)
+                a, b = corners[e], corners[(e + 1) % 3]
+                middle = (entry + at) / 2
+                along = (middle - a) @ (b - a) / ((b - a) @ (b - a))
+                point = a + np.clip(along, 0, 1) * (b - a)
+                waiting.append((length + np.linalg.norm(point - entry), twin // 3, point))
+    return np.inf, best[1]

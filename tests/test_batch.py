@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 import zoo
 
-import remeshvec
 from remeshvec import (
     BatchError,
     MeshFormatError,
@@ -447,59 +446,3 @@ def test_progress_on_a_terminal(monkeypatch):
     pytest.importorskip("rich")
     text = shown()
     assert "5/5" in text and "1 failed" in text
-
-
-# -- memory ---------------------------------------------------------------------------------------
-
-
-def resident():
-    """Memory of this process in RAM, in bytes."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-
-
-def mixed_calls():
-    """One call a kind: presets, constraints, lengths, counts, and calls that fail."""
-    V, F = zoo.grid(5, 5)
-    W, G = zoo.torus(8, 6)
-    calls = [
-        (V, F, 1.0, {}),
-        (W, G, None, {"preset": "fast"}),
-        (W, G, None, {"preset": "fine", "iterations": 3}),
-        (V, F, 1.0, {"boundary": "split", "feature_angle": 30.0}),
-        (V, F, 1.0, {"selection": [0, 1, 2, 3]}),
-        (W, G, remeshvec.Adaptive(0.2), {"preset": "fast", "iterations": 2}),
-        (V, F, None, {"n_faces": 40, "preset": "fast"}),
-        (V, F, -1.0, {}),
-        (V * np.nan, F, 1.0, {}),
-        (V, F + 100, 1.0, {}),
-        (V, F, 1e-9, {}),
-    ]
-
-    def call(k):
-        V, F, L, options = calls[k % len(calls)]
-        try:
-            result = remesh(V, F, L, **options)
-            result.birth_face, result.vertex_map, result.report.quality_after  # noqa: B018
-            return True
-        except RemeshvecError:
-            return False
-
-    return call
-
-
-def grown(count):
-    """Bytes that calls leave behind, after enough calls to fill all that is kept on purpose."""
-    call = mixed_calls()
-    for k in range(300):
-        call(k)
-    gc.collect()
-    before = resident()
-    good = sum(call(k) for k in range(count))
-    gc.collect()
-    assert abs(good / count - 7 / 11) < 0.01
-    return resident() - before
-
-
-@needs_proc
-def test_memory_does_not_grow_over_two_thousand_calls():
-    assert grown(2000) < 10e6

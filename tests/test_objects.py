@@ -268,6 +268,12 @@ def test_pairs_are_meshes_too():
     one, two = remesh((V, F), L), remesh(V, F, L)
     assert np.array_equal(one.V, two.V) and isinstance(one, RemeshResult)
     assert np.array_equal(remesh([V, F], L=L).V, two.V)
+    lengths = np.full(len(V), L)
+    assert np.array_equal(remesh((V, F), lengths).V, remesh(V, F, lengths).V)
+    with pytest.raises(MeshInputError, match="F"):
+        remesh([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])  # two vertices are no pair
+    with pytest.raises(OptionError, match="followed by the length alone"):
+        remesh((V, F), L, L)
     assert np.array_equal(remesh(V.tolist(), F.tolist(), L).V, two.V)
 
 

@@ -235,7 +235,7 @@ def test_without_preserve_data_are_still_found_on_their_side_of_creases():
     assert (np.sign(signed_areas(out)) == np.sign(signed_areas(uv)[result.face_birth])).all()
 
 
-def test_texture_comes_back_within_a_texel(tmp_path):
+def test_texture_comes_back_within_a_texel():
     """Rasterise both in texture space with the position on the surface as the colour, and compare."""
     for shape, L, angle in ((textured.cube, 0.25, "auto"), (textured.cylinder, 0.2, None)):
         V, F, uv = shape()

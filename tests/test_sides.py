@@ -1,0 +1,58 @@
+"""Ways over faces to a vertex, by which births across a seam are told from those on the own side."""
+
+import naive
+import numpy as np
+import pytest
+import textured
+
+from remeshvec import remesh
+from remeshvec.sides import _DETOUR, _NEARBY, _ways, locate_corners
+
+
+def provenance(V, F, uv, L):
+    """What a result holds of the last mesh and of the reference, until births were asked for."""
+    return remesh(V, F, L, preserve=uv, feature_angle=None)._corner_births._make.args[0]
+
+
+@pytest.mark.parametrize("shape", [textured.cylinder, textured.torus, textured.slit])
+def test_ways_are_those_of_the_twin(shape):
+    V, F, uv = shape()
+    V = V + np.random.default_rng(3).normal(size=V.shape) * 0.02
+    p = provenance(V, F, uv, 0.2)
+    tree, X = p.reference.tree, p.mesh.X[:, :3]
+    corners = p.mesh.origin.reshape(-1, 3)[p.rows][:120]
+    start = locate_corners(p)[0][:120, 1]
+    birth = (p.births()[0] // 3).astype(np.int32)
+    v, w = corners[:, 0].astype(np.int64), corners[:, 1]
+    near, length = _ways(p, v, w, start, birth)
+    for i in range(len(v)):
+        known, face = naive.ways(tree, start[i], birth[v[i]], X[v[i]], X[w[i]], _DETOUR, _NEARBY)
+        assert length[i] == pytest.approx(known, rel=1e-9)
+        distance = [naive.closest_on_triangle(X[v[i]], *tree.corners[f].reshape(3, 3))[1]
+                    for f in (near[i], face)]  # fmt: skip
+        assert distance[0] == pytest.approx(distance[1], abs=1e-12)
+
+
+def test_no_way_leads_across_a_seam():
+    """Straight across it is near, over the surface it goes around, or there is none."""
+    V, F, uv = textured.cylinder()
+    p = provenance(V, F, uv, 0.3)
+    left, right = np.flatnonzero(uv[:, :, 0].min(axis=1) == 0), uv[:, :, 0].max(axis=1) == 1
+    place = np.empty(len(F), np.int64)
+    place[p.face_source] = np.arange(len(F))
+    middle = V[F].mean(axis=1)
+    p.mesh.X[: len(left), :3] = middle[left]
+    across = [
+        np.flatnonzero(right)[np.linalg.norm(middle[right] - m, axis=1).argmin()]
+        for m in middle[left]
+    ]
+    n = len(left)
+    birth = np.zeros(len(p.mesh.X), np.int32)
+    birth[:n] = place[left]
+    p.mesh.X[n : 2 * n, :3] = middle[across]
+    v, w = np.arange(n), np.arange(n, 2 * n).astype(np.int32)
+    straight = np.linalg.norm(middle[left] - middle[across], axis=1)
+    _, own = _ways(p, v, w, place[left], birth)
+    _, length = _ways(p, v, w, place[across], birth)
+    assert np.allclose(own, straight) and straight.max() < 0.4
+    assert (length > 3.0).all()
