@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from remeshvec import quality, remesh, surface_distance
-from remeshvec.options import PRESETS, Options
+from remeshvec.input.options import PRESETS, Options
 
 from .meshes import LENGTH_FACTOR, load, small_meshes
 from .quality import TARGETS

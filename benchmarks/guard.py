@@ -37,7 +37,7 @@ import numpy as np
 from llvmlite import binding
 
 import remeshvec
-import remeshvec.report
+import remeshvec.output.report
 
 from .meshes import load
 

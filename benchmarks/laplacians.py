@@ -19,14 +19,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import eigsh, splu
 
-from remeshvec import (
-    LaplacianSolver,
-    cotangent_matrix,
-    laplacian,
-    quality,
-    remesh,
-    vertex_areas,
-)
+from remeshvec import LaplacianSolver, cotangent_matrix, laplacian, quality, remesh, vertex_areas
 
 from .meshes import SAMPLES, find_file, load, made
 from .panels import FloatArray, IntArray

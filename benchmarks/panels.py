@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from remeshvec import viz
-from remeshvec.mesh_data import split_vertices
-from remeshvec.mesh_files import write_file
+from remeshvec.files.plain import write_file
+from remeshvec.interop.mesh_data import split_vertices
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -8,7 +8,7 @@ from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
 
-from remeshvec._threads import available_threads
+from remeshvec.core.threads import available_threads
 
 from . import contenders as who
 from . import phases, start

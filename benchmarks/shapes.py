@@ -153,14 +153,14 @@ def bumpy_bar(
         V.append(np.column_stack([np.full(around, x), ring]))
     V.append([[0.0, 0.0, 0.0], [length, 0.0, 0.0]])
     i = np.arange(around)
-    following = (i + 1) % around
+    next_halfedge = (i + 1) % around
     F = []
     for j in range(rows):
-        a, b, c, d = around * j + np.array([i, following, i + around, following + around])
+        a, b, c, d = around * j + np.array([i, next_halfedge, i + around, next_halfedge + around])
         F += [(a, b, c), (b, d, c)] if j % 2 == 0 else [(a, b, d), (a, d, c)]
     first = np.full(around, around * (rows + 1))
     last = around * rows
-    F += [(following, i, first), (last + i, last + following, first + 1)]
+    F += [(next_halfedge, i, first), (last + i, last + next_halfedge, first + 1)]
     return np.concatenate(V), np.concatenate([np.column_stack(face) for face in F])
 
 

@@ -33,7 +33,7 @@ PHASES = {
 ROUNDS = 20
 
 # The module that calls the phases.
-MODULE = import_module("remeshvec.sweeps")
+MODULE = import_module("remeshvec.sweeps.sweeps")
 
 
 @pytest.mark.parametrize("mesh", DATA)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from benchmarks.tables import table
-from remeshvec._arguments import parser
+from remeshvec.cli.arguments import parser
 
 PAGE = Path(__file__).with_name("command-line.md")
 HEADING = "## All flags\n"

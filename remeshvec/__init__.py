@@ -5,7 +5,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from .distance import SurfaceDistance, surface_distance
+from .core.version import __version__ as __version__
 from .errors import (
     BatchError,
     MeshFormatError,
@@ -15,25 +15,24 @@ from .errors import (
     SingularSystemError,
     WorkerError,
 )
-from .mesh_files import MeshFile, read_mesh, write_mesh
-from .quality import Quality, quality
-from .remesh import remesh
-from .report import Report
-from .result import RemeshResult
-from .sizing import Adaptive
+from .files.plain import MeshFile, read_mesh, write_mesh
+from .measures.distance import SurfaceDistance, surface_distance
+from .measures.quality import Quality, quality
+from .output.report import Report
+from .output.result import RemeshResult
+from .pipeline.remesh import remesh
+from .sizing.adaptive import Adaptive
 
 if TYPE_CHECKING:
-    from .batch import BatchItem, remesh_many
-    from .data_files import remesh_file
-    from .editing import Editor, deform
-    from .fairing import fair
-    from .html_page import html_report, show_html, write_html
-    from .laplacians import cotangent_matrix, laplacian, vertex_areas
-    from .multiresolution import EditedSurface, MultiresolutionEditor
-    from .smoothing import smooth
-    from .solver import LaplacianSolver
-
-__version__ = "0.1.0"
+    from .batch.many import BatchItem, remesh_many
+    from .batch.one_file import remesh_file
+    from .html_page.page import html_report, show_html, write_html
+    from .modelling.editing import Editor, deform
+    from .modelling.fairing import fair
+    from .modelling.laplacians import cotangent_matrix, laplacian, vertex_areas
+    from .modelling.multiresolution import EditedSurface, MultiresolutionEditor
+    from .modelling.smoothing import smooth
+    from .modelling.solver import LaplacianSolver
 
 __all__ = [
     "Adaptive",
@@ -72,36 +71,39 @@ __all__ = [
     "write_mesh",
 ]
 
-# Imported when first asked for: they need scipy.sparse, which remeshing does not, or start processes.
-_LATE = {
-    "BatchItem": "batch",
-    "EditedSurface": "multiresolution",
-    "Editor": "editing",
-    "LaplacianSolver": "solver",
-    "MultiresolutionEditor": "multiresolution",
-    "cotangent_matrix": "laplacians",
-    "deform": "editing",
-    "fair": "fairing",
+# Imported on first use: these need scipy.sparse, which remeshing does not, or start processes.
+_LAZY = {
+    "BatchItem": "batch.many",
+    "EditedSurface": "modelling.multiresolution",
+    "Editor": "modelling.editing",
+    "LaplacianSolver": "modelling.solver",
+    "MultiresolutionEditor": "modelling.multiresolution",
+    "cotangent_matrix": "modelling.laplacians",
+    "deform": "modelling.editing",
+    "fair": "modelling.fairing",
     "html_report": "html_page",
-    "laplacian": "laplacians",
-    "remesh_file": "data_files",
-    "remesh_many": "batch",
+    "laplacian": "modelling.laplacians",
+    "remesh_file": "batch.one_file",
+    "remesh_many": "batch.many",
     "show_html": "html_page",
-    "smooth": "smoothing",
-    "vertex_areas": "laplacians",
+    "smooth": "modelling.smoothing",
+    "vertex_areas": "modelling.laplacians",
     "write_html": "html_page",
 }
+_FOLDERS = ("evolver", "html_page", "viz")  # public, each with names of its own
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _LATE:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(f".{_LATE[name]}", __name__), name)
+    if name in _FOLDERS:
+        return import_module(f".{name}", __name__)
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_LAZY[name]}", __name__), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_LATE})
+    return sorted([*__all__, *_FOLDERS, "__version__"])

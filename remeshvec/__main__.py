@@ -1,5 +1,5 @@
 """``python -m remeshvec`` is the shell command."""
 
-from .cli import main
+from .cli.command import main
 
 raise SystemExit(main())

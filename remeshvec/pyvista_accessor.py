@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import pyvista
 
-from .quality import Quality, quality
-from .remesh import RemeshOptions, remesh
+from .measures.quality import Quality, quality
+from .pipeline.remesh import RemeshOptions, remesh
 
 if TYPE_CHECKING:
     from typing import Unpack

@@ -67,7 +67,7 @@ def grouped(n: int, a, b) -> tuple[int, np.ndarray]:
     return int(count), label
 
 
-def following(h):
+def next_halfedge(h):
     return np.where(h % 3 == 2, h - 2, h + 1)
 
 
@@ -77,8 +77,8 @@ def fans(F) -> tuple[int, np.ndarray]:
     h, g = opposite_pairs(F)
     origin = F.ravel()
     opposite = origin[h] != origin[g]  # else the two faces run the edge the same way
-    tail, head = np.where(opposite, following(g), g), np.where(opposite, g, following(g))
-    return grouped(3 * len(F), np.append(h, following(h)), np.append(tail, head))
+    tail, head = np.where(opposite, next_halfedge(g), g), np.where(opposite, g, next_halfedge(g))
+    return grouped(3 * len(F), np.append(h, next_halfedge(h)), np.append(tail, head))
 
 
 def patches(F) -> tuple[int, np.ndarray]:
@@ -120,8 +120,8 @@ def boundary_loop_count(F) -> int:
     edges = edges_of(F)
     n_fans, fan = fans(F)
     h = np.flatnonzero(edges.faces[edges.of] == 1)
-    ends = np.append(fan[h], fan[following(h)])
-    _, loop = grouped(n_fans, fan[h], fan[following(h)])
+    ends = np.append(fan[h], fan[next_halfedge(h)])
+    _, loop = grouped(n_fans, fan[h], fan[next_halfedge(h)])
     return len(np.unique(loop[ends]))
 
 

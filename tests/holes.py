@@ -7,10 +7,10 @@ import numpy as np
 import zoo
 from structure import blocks_of, built, faces_of, featured, one_block
 
-from remeshvec._types import DEAD, Mesh
-from remeshvec.edge_sets import make_blocks
+from remeshvec.core.vocabulary import DEAD, Mesh
+from remeshvec.mesh.blocks import make_blocks
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
-from remeshvec.operations.split import ROOM, compact
+from remeshvec.operations.split import SPARE, compact
 
 OPEN = ["grid", "annulus", "planar_delaunay", "cylinder"]
 CLOSED = ["torus", "genus_2", "closed_cylinder", "l_prism", "icosphere"]
@@ -67,7 +67,7 @@ def holed(name, seed, per_block, monkeypatch, count=6):
     mesh = built(V, F, ordered=True)
     L = zoo.mean_edge(V, F)
     reference = featured(mesh, L, feature_angle=40.0).reference
-    mesh = compact(mesh, blocks_of(mesh, per_block, monkeypatch), False, ROOM)
+    mesh = compact(mesh, blocks_of(mesh, per_block, monkeypatch), False, SPARE)
     limits = CollapseLimits(0.8, 1.5, 0.7, 0.5, False)
     collapse_short_edges(mesh, make_blocks(mesh), limits, False)
     mesh.X[:, 3] = 2 * longest_edge(mesh.X[:, :3], faces_of(mesh))

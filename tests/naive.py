@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from remeshvec.geometry import SHARP
+from remeshvec.core.geometry import SHARP
 
 Face = tuple[int, int, int]
 
@@ -146,8 +146,8 @@ def valence_gain(F, a: int, b: int) -> int:
 
 def violates_delaunay(V, F, a: int, b: int) -> bool:
     """Whether the angles opposite a-b sum to more than pi."""
-    apexes = [(set(f) - {a, b}).pop() for f in tuples(F) if {a, b} <= set(f)]
-    return sum(angle(V[c], V[a], V[b]) for c in apexes) > np.pi + 1e-9
+    find_tips = [(set(f) - {a, b}).pop() for f in tuples(F) if {a, b} <= set(f)]
+    return sum(angle(V[c], V[a], V[b]) for c in find_tips) > np.pi + 1e-9
 
 
 # --- formulas ------------------------------------------------------------------------------------

@@ -7,7 +7,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from remeshvec import _jit, _threads
+from remeshvec.core import compiler as _jit
+from remeshvec.core import threads as _threads
 
 
 @contextmanager

@@ -89,7 +89,7 @@ class Numpy:
 
 def install() -> None:
     """Make all kernels of remeshvec strict."""
-    from remeshvec import _jit
+    from remeshvec.core import compiler as _jit
 
     modules = list(all_modules())
     for module in modules:

@@ -9,27 +9,28 @@ import topology
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from remeshvec._types import (
+from remeshvec.core.vocabulary import (
     CURVE,
     DEAD,
     FIXED,
     FROZEN,
     HELD,
     INNER,
+    NON_MANIFOLD,
     NONE,
-    SEAM,
     Blocks,
     Mesh,
     Tree,
 )
-from remeshvec.bvh import build_tree
-from remeshvec.constraints import make_constraints
-from remeshvec.curves import link_chains
-from remeshvec.edge_sets import make_blocks
-from remeshvec.halfedge import build_mesh
-from remeshvec.operations.project import Reference, locate_vertices, project_vertices
-from remeshvec.order import order_mesh
-from remeshvec.reference import Built, build_reference
+from remeshvec.features.curves import link_chains
+from remeshvec.input.constraints import make_constraints
+from remeshvec.mesh.blocks import make_blocks
+from remeshvec.mesh.halfedge import build_mesh
+from remeshvec.mesh.morton import order_mesh
+from remeshvec.operations.project import locate_vertices, project_vertices
+from remeshvec.reference.build import FeaturedReference, build_reference
+from remeshvec.reference.bvh import build_tree
+from remeshvec.reference.surface import Reference
 
 
 def built(V, F, ordered: bool = False, length: float = 1.0) -> Mesh:
@@ -85,7 +86,7 @@ def curve_edges(mesh: Mesh) -> dict[frozenset[int], int]:
 
 def featured(
     mesh: Mesh, length: float | None = None, vertex_source=None, parallel: bool = False, **wanted
-) -> Built:
+) -> FeaturedReference:
     """Find and mark the features of a mesh: all that `build_reference` returns.
 
     ``wanted`` are the keywords of `make_constraints`, in terms of the vertices before the surface was
@@ -143,7 +144,7 @@ def one_block(mesh: Mesh) -> Blocks:
 
 
 def blocks_of(mesh: Mesh, faces_per_block: int, monkeypatch) -> Blocks:
-    monkeypatch.setattr("remeshvec.edge_sets.FACES_PER_BLOCK", faces_per_block)
+    monkeypatch.setattr("remeshvec.mesh.blocks.FACES_PER_BLOCK", faces_per_block)
     return make_blocks(mesh)
 
 
@@ -276,7 +277,7 @@ def assert_on_reference(mesh: Mesh, reference: Reference) -> None:
     patch = reference.tree.patch
     alive = np.flatnonzero(mesh.origin != DEAD)
     on_curve = alive[mesh.curve[alive] >= 0]
-    names = mesh.curve[on_curve] & (SEAM - 1)
+    names = mesh.curve[on_curve] & (NON_MANIFOLD - 1)
     assert (reference.tree.twin[names] == NONE).all(), "an edge on a curve that does not exist"
     inside = alive[(mesh.curve[alive] == NONE) & (mesh.twin[alive] != NONE)]
     own, across = patch[mesh.source[inside // 3]], patch[mesh.source[mesh.twin[inside] // 3]]
@@ -300,9 +301,11 @@ def assert_on_reference(mesh: Mesh, reference: Reference) -> None:
 def chains_of(reference: Reference) -> np.ndarray:
     """Equal numbers for edges of the same polyline, by their names."""
     h = np.arange(len(reference.origin))
-    if not reference.beside.shape[1]:
+    if not reference.curve_neighbours.shape[1]:
         return h
-    pairs = np.array([(i, j) for side in reference.beside for i, j in enumerate(side) if j != NONE])
+    pairs = np.array(
+        [(i, j) for side in reference.curve_neighbours for i, j in enumerate(side) if j != NONE]
+    )
     graph = coo_matrix((np.ones(len(pairs)), pairs.reshape(-1, 2).T), shape=(len(h), len(h)))
     return connected_components(graph, directed=False)[1]
 

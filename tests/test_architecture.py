@@ -1,4 +1,4 @@
-"""The layers: imports run downwards only, no cycles, short files, a light `import remeshvec`."""
+"""The house: folders import folders below them only, files are short, `import remeshvec` is light."""
 
 import ast
 import os
@@ -8,157 +8,95 @@ from pathlib import Path
 
 import pytest
 
+import remeshvec
+
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "remeshvec"
 
-# Lower numbers may not import higher ones; the same number may not import itself but for `SIDEWAYS`.
-LEVELS = {
-    0: ["_types", "_jit", "_threads", "_check", "errors"],
-    1: ["geometry"],
-    2: ["halfedge", "twins", "order", "orient", "edge_sets", "bvh", "curves", "polyline", "clean"],
-    3: [
-        "quality", "distance", "features", "turns", "creases", "_chains", "_echo", "corners", "sizing",
-        "curvature", "gradation", "mesh_data", "meshio_data", "objects", "transfer",
-    ],
-    4: [
-        "operations", "operations.split", "operations.collapse", "operations.flip",
-        "operations.relax", "operations.project", "operations.slide", "operations.unfold",
-        "operations.untangle", "operations.fit", "operations.guards", "operations.siblings",
-        "operations.bisect", "operations.measure", "operations.rings", "operations.templates",
-    ],
-    5: [
-        "options", "constraints", "prepare", "lengths", "reference", "seams", "deviation",
-        "report", "sweeps", "sides", "provenance", "extract", "result", "job", "remesh",
-    ],
-    6: [
-        "laplacians", "solver", "motion", "fairing", "editing", "multiresolution", "smoothing",
-        "_file_guards", "_ply_guard", "_mesh_writers", "mesh_files",
-        "_obj_data", "_ply_data", "_foreign_files", "data_files", "pyvista_accessor",
-        "_serving", "_workers", "_progress",
-    ],
-    7: [
-        "evolver", "evolver.energies", "evolver.problem", "evolver.minimize",
-        "evolver.necks", "evolver.evolve", "evolver.errors", "evolver.surface_evolver",
-        "viz", "html_page", "_page_views", "_page_charts", "_arguments", "_array_files",
-        "batch", "_batch_files", "_batch_table", "_batch_command", "cli",
-    ],
-    8: ["__main__"],
-}  # fmt: skip
-SIDEWAYS = {
-    ("_check", "errors"), ("_jit", "_threads"),
-    ("halfedge", "twins"), ("twins", "order"),
-    ("bvh", "halfedge"), ("curves", "halfedge"), ("orient", "twins"), ("polyline", "halfedge"),
-    ("polyline", "curves"),
-    ("creases", "_chains"), ("creases", "_echo"), ("creases", "turns"), ("_echo", "turns"),
-    ("meshio_data", "mesh_data"), ("objects", "mesh_data"), ("objects", "meshio_data"),
-    ("features", "turns"), ("sizing", "curvature"), ("sizing", "gradation"),
-    ("operations.collapse", "operations.guards"), ("operations.siblings", "operations.collapse"),
-    ("operations.bisect", "operations.measure"), ("operations.collapse", "operations.measure"),
-    ("operations.collapse", "operations.rings"), ("operations.siblings", "operations.rings"),
-    ("operations.split", "operations.bisect"), ("operations.split", "operations.measure"),
-    ("operations.split", "operations.templates"),
-    ("operations.slide", "operations.project"),
-    ("lengths", "constraints"), ("lengths", "prepare"),
-    ("reference", "constraints"), ("seams", "reference"), ("deviation", "reference"),
-    ("report", "options"),
-    *(("sweeps", name) for name in (
-        "options", "lengths", "reference", "seams", "deviation", "report",
-    )),
-    ("sides", "report"), ("provenance", "sides"), ("result", "report"),
-    *(("extract", name) for name in (
-        "constraints", "prepare", "reference", "report", "seams", "sides",
-    )),
-    *(("job", name) for name in ("constraints", "prepare", "lengths", "reference", "sweeps")),
-    *(("remesh", name) for name in (
-        "options", "constraints", "prepare", "lengths", "provenance", "sweeps", "extract", "job",
-        "report", "result",
-    )),
-    ("fairing", "laplacians"), ("fairing", "solver"),
-    ("editing", "fairing"), ("editing", "laplacians"),
-    *(("multiresolution", name) for name in ("editing", "fairing", "laplacians", "motion")),
-    ("smoothing", "laplacians"), ("smoothing", "solver"),
-    ("_ply_guard", "_file_guards"),
-    ("_foreign_files", "_workers"), ("_workers", "_serving"),
-    *(("data_files", name) for name in ("_foreign_files", "_obj_data", "_ply_data", "mesh_files")),
-    ("mesh_files", "_file_guards"), ("mesh_files", "_mesh_writers"), ("mesh_files", "_ply_guard"),
-    ("evolver.problem", "evolver.energies"), ("evolver.minimize", "evolver.problem"),
-    ("evolver.necks", "evolver.energies"),
-    *(("evolver.surface_evolver", f"evolver.{name}") for name in ("errors", "minimize", "problem")),
-    *(("evolver.evolve", f"evolver.{name}") for name in ("energies", "minimize", "necks", "problem")),
-    *(("cli", name) for name in ("_arguments", "_array_files", "_batch_command", "html_page", "viz")),
-    *(("_batch_command", name) for name in ("_arguments", "_batch_files", "_batch_table", "batch")),
-    ("html_page", "_page_charts"), ("html_page", "_page_views"), ("_page_views", "viz"),
-}  # fmt: skip
-LEVEL = {name: level for level, names in LEVELS.items() for name in names}
+# From the ground up: a folder (or a file beside the folders) imports what stands on floors below its own.
+FLOORS = [
+    ["errors"],
+    ["core"],
+    ["mesh", "measures", "processes", "interop"],
+    ["features", "input", "files"],
+    ["sizing", "viz"],
+    ["reference", "html_page"],
+    ["operations"],
+    ["sweeps", "output"],
+    ["pipeline"],
+    ["modelling", "batch", "pyvista_accessor"],
+    ["evolver"],
+    ["__init__"],
+    ["cli"],
+    ["__main__"],
+]
+FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
+FILES = {str(p.relative_to(PACKAGE)): p for p in sorted(PACKAGE.rglob("*.py"))}
 
 
-def modules():
-    """Module names inside the package, with their files; the package itself is left out."""
-    for path in sorted(PACKAGE.rglob("*.py")):
-        name = ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
-        if name != "__init__":
-            yield name, path
+def tree_of(path):
+    return ast.parse(path.read_text())
 
 
-def imports(name, path):
-    """Modules of the package that a module imports, also inside functions."""
-    package = ["remeshvec", *name.split(".")]
-    if path.name != "__init__.py":
-        package.pop()
-    for node in ast.walk(ast.parse(path.read_text())):
+def imported(name, path):
+    """Modules of the package that a file imports, also inside functions, as dotted names.
+
+    Imports for annotations only (``if TYPE_CHECKING``) never run, so they are left out.
+    """
+    tree = tree_of(path)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            node.body = []
+    package = ["remeshvec", *Path(name).parent.parts]
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            found = [alias.name for alias in node.names]
+            yield from (a.name for a in node.names if a.name.split(".")[0] == "remeshvec")
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) + 1 - node.level] if node.level else []
-            whole = ".".join([*base, *([node.module] if node.module else [])])
-            found = [whole, *(f"{whole}.{alias.name}" for alias in node.names)]
-        else:
-            continue
-        for target in found:
-            inner = target.removeprefix("remeshvec.")
-            if inner != target and inner in LEVEL:
-                yield inner
+            source = ".".join([*base, *([node.module] if node.module else [])])
+            if source.split(".")[0] == "remeshvec":
+                yield from (f"{source}.{a.name}" for a in node.names)
 
 
-ALL = dict(modules())
-GRAPH = {name: set(imports(name, path)) - {name} for name, path in ALL.items()}
+def room_of(dotted):
+    """Name the folder, or the file beside the folders, that holds what a dotted name means."""
+    parts = dotted.split(".")
+    return parts[1] if len(parts) > 1 and parts[1] in FLOOR else "__init__"
 
 
-def test_every_module_has_a_level():
-    assert set(ALL) == set(LEVEL)
+def file_of(dotted):
+    """Name the file that a dotted name lies in: the longest part of it that is a module."""
+    parts = dotted.split(".")[1:]
+    for k in range(len(parts), -1, -1):
+        for file in ("/".join(parts[:k]) + ".py", "/".join([*parts[:k], "__init__.py"])):
+            if file in FILES:
+                return file
+    raise AssertionError(dotted)
+
+
+GRAPH = {
+    name: {file_of(dotted) for dotted in imported(name, path)} - {name}
+    for name, path in FILES.items()
+}
+
+
+def test_every_room_has_a_floor():
+    assert {name.split("/")[0].removesuffix(".py") for name in FILES} == set(FLOOR)
 
 
 def test_the_graph_is_seen():
     """The test of the test: relative imports of all kinds are found."""
-    assert {"options", "prepare", "_jit", "sweeps"} <= GRAPH["remesh"]
-    assert {"operations.split", "deviation", "edge_sets"} <= GRAPH["sweeps"]
-    assert {"_jit", "_types", "edge_sets", "geometry", "halfedge"} <= GRAPH["operations.collapse"]
-    assert "errors" in GRAPH["_check"]
+    assert {"input/options.py", "input/prepare.py", "errors.py"} <= GRAPH["pipeline/remesh.py"]
+    assert "html_page/__init__.py" in GRAPH["output/result.py"]  # inside a function
+    assert "core/threads.py" in GRAPH["core/compiler.py"]
 
 
-@pytest.mark.parametrize("name", sorted(ALL))
+@pytest.mark.parametrize("name", FILES)
 def test_imports_run_downwards(name):
-    for other in GRAPH[name]:
-        if {other, name} & {"operations", "evolver"}:
-            continue
-        allowed = LEVEL[other] < LEVEL[name] or (name, other) in SIDEWAYS
-        assert allowed, f"{name} (level {LEVEL[name]}) imports {other} (level {LEVEL[other]})"
-
-
-def test_no_exception_is_stale():
-    """Every pair in `SIDEWAYS` is an import that exists, between modules of the same level."""
-    for name, other in SIDEWAYS:
-        assert other in GRAPH[name] and LEVEL[name] == LEVEL[other], f"{name} -> {other}"
-
-
-def test_operations_and_fields_meet_in_policy_only():
-    fields = LEVELS[3]
-    for name in LEVELS[4]:
-        assert not GRAPH[name] & set(fields)
-        operations = {other for other in GRAPH[name] if other.startswith("operations.")}
-        assert all((name, other) in SIDEWAYS for other in operations)
-    for name in fields:
-        assert not {other for other in GRAPH[name] if other.startswith("operations")}
+    here = name.split("/")[0].removesuffix(".py")
+    for dotted in imported(name, FILES[name]):
+        there = room_of(dotted)
+        assert there == here or FLOOR[there] < FLOOR[here], f"{name} imports {dotted}"
 
 
 def test_no_cycles():
@@ -178,19 +116,43 @@ def test_no_cycles():
         visit(name)
 
 
+def test_every_folder_says_its_contract():
+    for name, path in FILES.items():
+        if name.endswith("/__init__.py"):
+            said = ast.get_docstring(tree_of(path))
+            assert said and said.splitlines()[0].endswith("."), name
+
+
 @pytest.mark.parametrize(
-    "path", [*ALL.values(), *sorted((ROOT / "tests").glob("*.py"))], ids=lambda p: p.stem
+    "path", [*FILES.values(), *sorted((ROOT / "tests").rglob("*.py"))], ids=lambda p: p.stem
 )
 def test_files_are_short(path):
     limit = 420 if path.is_relative_to(PACKAGE) else 520
     assert len(path.read_text().splitlines()) <= limit
 
 
+def functions():
+    for name, path in FILES.items():
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.FunctionDef):
+                yield name, node
+
+
+def is_kernel(function):
+    return any(
+        getattr(getattr(d, "func", d), "id", "") in ("inlined", "kernel", "threaded")
+        for d in function.decorator_list
+    )
+
+
 def test_numba_flags_live_in_one_module():
-    for name, path in ALL.items():
-        if name in ("_jit", "_threads"):  # these ask Numba how many threads there are
+    for name, path in FILES.items():
+        if name in (
+            "core/compiler.py",
+            "core/threads.py",
+        ):  # the second asks how many threads there are
             continue
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.ImportFrom) and node.module:
                 assert not node.module.startswith("numba"), name
             if isinstance(node, ast.Import):
@@ -199,14 +161,10 @@ def test_numba_flags_live_in_one_module():
 
 def test_kernels_never_raise():
     """Kernels return a status: who calls them knows what to say."""
-    for name, path in ALL.items():
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.FunctionDef) and any(
-                getattr(getattr(d, "func", d), "id", "") in ("inlined", "kernel", "threaded")
-                for d in node.decorator_list
-            ):
-                bad = [n for n in ast.walk(node) if isinstance(n, ast.Raise | ast.Assert | ast.Try)]
-                assert not bad, f"{name}.{node.name}"
+    for name, function in functions():
+        if is_kernel(function):
+            bad = [n for n in ast.walk(function) if isinstance(n, ast.Raise | ast.Assert | ast.Try)]
+            assert not bad, f"{name}: {function.name}"
 
 
 def python(code, **env):
@@ -219,6 +177,14 @@ def python(code, **env):
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.split()
+
+
+def test_public_names_are_those_listed():
+    """`dir` shows what `__all__` lists, and every name in it is there."""
+    assert set(dir(remeshvec)) == {*remeshvec.__all__, "__version__", "evolver", "html_page", "viz"}
+    assert all(hasattr(remeshvec, name) for name in remeshvec.__all__)
+    for folder in (remeshvec.evolver, remeshvec.viz, remeshvec.html_page):
+        assert set(dir(folder)) == set(folder.__all__)
 
 
 def test_import_is_light():
@@ -237,7 +203,7 @@ def test_import_is_light():
         "plotly",
     }
     assert not (parts | others) & loaded
-    assert {"numba", "numpy", "remeshvec.remesh"} <= loaded
+    assert {"numba", "numpy", "remeshvec.pipeline.remesh"} <= loaded
 
 
 def test_a_call_needs_neither_scipy_nor_libigl():

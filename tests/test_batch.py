@@ -25,13 +25,13 @@ from remeshvec import (
     OptionError,
     RemeshvecError,
     WorkerError,
-    _progress,
-    _workers,
     read_mesh,
     remesh,
     remesh_many,
     write_mesh,
 )
+from remeshvec.batch import progress as _progress
+from remeshvec.processes import pool as _workers
 
 ROOT = Path(__file__).resolve().parents[1]
 PATIENCE = 60.0

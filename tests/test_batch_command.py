@@ -17,10 +17,11 @@ import zoo
 from test_batch import PATIENCE, ROOT, alive, needs_proc
 
 import remeshvec
-from remeshvec import _batch_command, read_mesh, remesh, write_mesh
-from remeshvec._batch_files import find_jobs
-from remeshvec._batch_table import COLUMNS, MEASURES, Table
-from remeshvec.cli import main
+from remeshvec import read_mesh, remesh, write_mesh
+from remeshvec.cli import batch_command as _batch_command
+from remeshvec.cli.batch_files import find_jobs
+from remeshvec.cli.batch_table import COLUMNS, MEASURES, Table
+from remeshvec.cli.command import main
 
 
 @pytest.fixture

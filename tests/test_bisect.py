@@ -24,26 +24,26 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import CURVE, DEAD, FIXED, FROZEN, HALTED, NONE, SEAM
-from remeshvec.edge_sets import make_blocks
-from remeshvec.halfedge import ends_of
+from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, FROZEN, HALTED, NON_MANIFOLD, NONE
+from remeshvec.features.polyline import find_siblings
+from remeshvec.mesh.blocks import make_blocks
+from remeshvec.mesh.walk import ends_of
 from remeshvec.operations import split as module
 from remeshvec.operations.bisect import bisect_edges
-from remeshvec.operations.measure import measure_edges
+from remeshvec.operations.classify import classify_edges
 from remeshvec.operations.split import split_long_edges
-from remeshvec.polyline import find_siblings
 
 
 def assert_true(flags, mesh, blocks):
     """The flags are what is measured anew."""
-    fresh = measure_edges(mesh, blocks, flags.longest, flags.shortest, False)
+    fresh = classify_edges(mesh, blocks, flags.longest, flags.shortest, False)
     assert np.array_equal(flags.mask, fresh.mask)
     return fresh
 
 
 def bisect(mesh, blocks, longest=1.0, shortest=0.5, parallel=False):
     """Split in place; returns how many were split and are left, after all checks of the flags."""
-    flags = measure_edges(mesh, blocks, longest, shortest, parallel)
+    flags = classify_edges(mesh, blocks, longest, shortest, parallel)
     n_split, n_left = bisect_edges(mesh, blocks, flags, parallel)
     fresh = assert_true(flags, mesh, blocks)
     assert n_left == fresh.n_long
@@ -213,10 +213,10 @@ def test_siblings_are_never_split_in_place():
     featured(mesh, 1.0, vertex_source=source, feature_angle=40.0)
     mesh = with_room(mesh, 500, 500)
     mesh.X[:, 3] = 2 * longest_edge(mesh.X[:, :3], faces_of(mesh))
-    h = np.flatnonzero((mesh.curve >= SEAM) & (mesh.origin != DEAD)).astype(np.int32)
+    h = np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).astype(np.int32)
     siblings = find_siblings(mesh.X, mesh.origin, h)
     mesh.X[ends_of(mesh.origin, siblings[0][:1]), 3] = 0.1
-    flags = measure_edges(mesh, one_block(mesh), 1.0, 0.0, False)
+    flags = classify_edges(mesh, one_block(mesh), 1.0, 0.0, False)
     assert 0 < 2 * flags.n_long <= flags.n_gone and 16 * flags.n_long <= len(flags.mask)
     before = copied(mesh)
     refined, count = split_long_edges(mesh, one_block(mesh), 1.0, False, siblings)
@@ -243,7 +243,7 @@ def test_nothing_long_is_left_in_any_number_of_blocks(name, seed, per_block, mon
     assert numbers(mesh)[1] == before[1] + n_split
     assert numbers(mesh)[0] <= before[0] + 2 * n_split
     if not n_left:
-        assert measure_edges(mesh, blocks, 1.0, 0.5, False).n_long == 0
+        assert classify_edges(mesh, blocks, 1.0, 0.5, False).n_long == 0
         assert bisect(mesh, blocks) == (0, 0)
 
 
@@ -272,7 +272,7 @@ def test_new_elements_lie_in_the_block_of_their_parents(name, monkeypatch):
     mesh, _ = holed(name, 0, 60, monkeypatch)
     blocks = make_blocks(mesh)
     was_dead = mesh.vertex_halfedge == DEAD
-    flags = measure_edges(mesh, blocks, 1.0, 0.5, False)
+    flags = classify_edges(mesh, blocks, 1.0, 0.5, False)
     monkeypatch.setattr("remeshvec.operations.bisect.stages", lambda _: (0,))
     bisect_edges(mesh, blocks, flags, False)
     new = np.flatnonzero(was_dead & (mesh.vertex_halfedge != DEAD))
@@ -302,7 +302,7 @@ def test_few_long_edges_are_split_in_place(name):
     """All of them at once, and the flags say afterwards what is short."""
     mesh, reference = few_long(name, 2)
     shape = shape_of(faces_of(mesh))
-    flags = measure_edges(mesh, one_block(mesh), 1.0, 0.3, False)
+    flags = classify_edges(mesh, one_block(mesh), 1.0, 0.3, False)
     assert flags.n_long > 0
     same, count = split_long_edges(mesh, one_block(mesh), 1.0, False, None, flags)
     assert same is mesh and count > 0
@@ -319,7 +319,7 @@ def test_where_room_runs_out_the_mesh_is_written_anew(faces, vertices):
     mesh, reference = spotted("annulus", 1)
     n = len(mesh.X)
     mesh = with_room(mesh, faces, vertices)
-    flags = measure_edges(mesh, one_block(mesh), 1.0, 0.3, False)
+    flags = classify_edges(mesh, one_block(mesh), 1.0, 0.3, False)
     flags = flags._replace(n_gone=10**6)  # so that it is tried
     refined, count = split_long_edges(mesh, one_block(mesh), 1.0, False, None, flags)
     assert refined is not mesh and count > min(vertices, faces // 2)
@@ -359,7 +359,7 @@ def test_when_it_is_tried(monkeypatch):
     mesh, _ = few_long("torus", 1)
     called = []
     monkeypatch.setattr(module, "bisect_edges", lambda *a: called.append(a) or (0, 1))
-    flags = measure_edges(mesh, one_block(mesh), 1.0, 0.3, False)
+    flags = classify_edges(mesh, one_block(mesh), 1.0, 0.3, False)
     size = len(flags.mask)
     for n_long, n_gone, expected in [
         (size // 16, size, 1),

@@ -7,9 +7,9 @@ import pytest
 import zoo
 from structure import built, faces_of, referenced, tree_of
 
-from remeshvec._jit import kernel
-from remeshvec._types import NONE
-from remeshvec.bvh import STACK, closest_face, closest_faces, search_face
+from remeshvec.core.compiler import kernel
+from remeshvec.core.vocabulary import NONE
+from remeshvec.reference.bvh import STACK, closest_face, closest_faces, search_face
 
 RNG = np.random.default_rng(11)
 

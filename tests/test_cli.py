@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import remeshvec
-from remeshvec.cli import Progress, main
+from remeshvec.cli.command import Progress, main
 from remeshvec.errors import OptionError
-from remeshvec.mesh_files import SUFFIXES, read_mesh, write_mesh
+from remeshvec.files.plain import SUFFIXES, read_mesh, write_mesh
 
 SAMPLES = Path(__file__).parents[2] / "shared" / "data" / "samples"
 needs_samples = pytest.mark.skipif(not SAMPLES.is_dir(), reason="the samples are not here")
@@ -145,7 +145,7 @@ def test_options_reach_the_library(sheet, asked):
 
 
 def test_length_factor_multiplies_the_mean_edge(sheet, asked):
-    from remeshvec.quality import quality
+    from remeshvec.measures.quality import quality
 
     assert main([sheet, "--l-factor", "1.5", "--sliver-check"]) == 0
     assert asked[0]["L"] == pytest.approx(1.5 * quality(*bumpy_sheet()).edge_mean, rel=1e-12)
@@ -251,7 +251,7 @@ class Terminal(io.StringIO):
 
 
 def test_progress_rewrites_one_line_on_a_terminal(monkeypatch):
-    monkeypatch.setattr("remeshvec.cli.PATIENCE", 0)
+    monkeypatch.setattr("remeshvec.cli.command.PATIENCE", 0)
     progress = Progress(Terminal())
     progress(0, "split", 1234)
     progress(0, "collapse", 5)
@@ -265,7 +265,7 @@ def test_progress_rewrites_one_line_on_a_terminal(monkeypatch):
 
 
 def test_progress_has_a_line_a_sweep_in_a_log(monkeypatch):
-    monkeypatch.setattr("remeshvec.cli.PATIENCE", 0)
+    monkeypatch.setattr("remeshvec.cli.command.PATIENCE", 0)
     progress = Progress(io.StringIO())
     for sweep in range(2):
         for phase in ("split", "collapse"):
@@ -282,7 +282,7 @@ def test_short_work_shows_no_progress():
 
 
 def test_progress_of_real_work(sheet, capsys, monkeypatch):
-    monkeypatch.setattr("remeshvec.cli.PATIENCE", 0)
+    monkeypatch.setattr("remeshvec.cli.command.PATIENCE", 0)
     assert main([sheet, "--iterations", "2", "--preset", "fast"]) == 0
     err = capsys.readouterr().err
     assert "sweep 1, 0 s\n" in err and "sweep 2, 0 s\n" in err

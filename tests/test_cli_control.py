@@ -8,7 +8,7 @@ import zoo
 
 import remeshvec
 from remeshvec import Adaptive, read_mesh, write_mesh
-from remeshvec.cli import main
+from remeshvec.cli.command import main
 
 
 @pytest.fixture
@@ -108,7 +108,7 @@ def test_what_cannot_work_ends_in_one_line(asked, capsys, flags, word):
 
 
 def test_numbers_are_read_as_people_write_them(tmp_path):
-    from remeshvec._array_files import read_array
+    from remeshvec.cli.array_files import read_array
 
     path = tmp_path / "numbers.txt"
     path.write_text("# what\n1, 2\n3 4 # and why\n\n")

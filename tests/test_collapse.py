@@ -17,7 +17,7 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import CURVE, DEAD, FIXED, HELD, INNER
+from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, HELD, INNER
 from remeshvec.operations.collapse import (
     COLLAPSED,
     KEPT_CURVE,
@@ -174,8 +174,8 @@ def test_link_condition_necklace():
         for a, b in map(sorted, naive.edges(F))
         if any({a, b, c} not in [set(f) for f in F.tolist()] for c in ring[a] & ring[b])
     )
-    apexes = {v for f in F.tolist() if {a, b} <= set(f) for v in f} - {a, b}
-    assert len(apexes) == 2 and len(ring[a] & ring[b]) == 3
+    find_tips = {v for f in F.tolist() if {a, b} <= set(f) for v in f} - {a, b}
+    assert len(find_tips) == 2 and len(ring[a] & ring[b]) == 3
     assert not naive.link_condition(F, a, b)
     broken = naive.collapse(F, a, b)
     assert not zoo.is_edge_manifold(broken)

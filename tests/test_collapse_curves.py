@@ -25,7 +25,19 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import CURVE, DEAD, FIXED, FROZEN, HALTED, HELD, INNER, NONE, PINNED, SEAM
+from remeshvec.core.vocabulary import (
+    CURVE,
+    DEAD,
+    FIXED,
+    FROZEN,
+    HALTED,
+    HELD,
+    INNER,
+    NON_MANIFOLD,
+    NONE,
+    PINNED,
+)
+from remeshvec.features.polyline import find_siblings
 from remeshvec.operations.collapse import (
     COLLAPSED,
     KEPT_CURVE,
@@ -33,7 +45,6 @@ from remeshvec.operations.collapse import (
     collapse_short_edges,
 )
 from remeshvec.operations.siblings import collapse_siblings
-from remeshvec.polyline import find_siblings
 
 LOOSE = CollapseLimits(
     shortest=2e-3, longest=1e9, foldover_cosine=0.0, quadric_reach=0.0, sliver_check=False
@@ -72,15 +83,17 @@ def may_collapse(mesh, a, b):
     curves, F = curve_edges(mesh), faces_of(mesh)
     low = min(mesh.kind[a], mesh.kind[b])
     edge = frozenset((a, b))
-    apexes = [(set(f) - edge).pop() for f in F.tolist() if edge <= set(f)]
+    find_tips = [(set(f) - edge).pop() for f in F.tolist() if edge <= set(f)]
     if low == INNER:
         return True
     if low != CURVE or curves.get(edge, NONE) < 0:
         return False
-    if any({frozenset((a, c)), frozenset((b, c))} <= set(curves) for c in apexes):
+    if any({frozenset((a, c)), frozenset((b, c))} <= set(curves) for c in find_tips):
         return False
     rim = naive.boundary_edges(F)
-    return edge not in rim or not {frozenset((a, apexes[0])), frozenset((b, apexes[0]))} <= rim
+    return (
+        edge not in rim or not {frozenset((a, find_tips[0])), frozenset((b, find_tips[0]))} <= rim
+    )
 
 
 def expected_curves(mesh, survivor, removed):
@@ -185,7 +198,7 @@ def test_held_vertices_stay_and_swallow(kind):
             assert mesh.kind[held] == kind and np.array_equal(mesh.X[held], place)
 
 
-@pytest.mark.parametrize("flag", [FROZEN, HALTED, 5 + SEAM])
+@pytest.mark.parametrize("flag", [FROZEN, HALTED, 5 + NON_MANIFOLD])
 def test_frozen_edges_and_seams_do_not_collapse(flag):
     """Seams do in a pass of their own."""
     mesh = crossed()
@@ -197,14 +210,14 @@ def test_frozen_edges_and_seams_do_not_collapse(flag):
     assert_same_bits(mesh, before)
 
 
-@pytest.mark.parametrize("flag", [NONE, 7, 7 + SEAM, FROZEN, HALTED])
-@pytest.mark.parametrize("which", ["following", "previous"])
+@pytest.mark.parametrize("flag", [NONE, 7, 7 + NON_MANIFOLD, FROZEN, HALTED])
+@pytest.mark.parametrize("which", ["next_halfedge", "previous_halfedge"])
 def test_the_flag_of_either_vanished_edge_is_on_both_sides_of_the_new(which, flag):
     mesh = built(*zoo.grid(9, 8))
     a, b = at(4, 4), at(5, 4)
     h = half_edge(mesh, a, b)
     apex = int(mesh.origin[next_of(next_of(h))])
-    end = b if which == "following" else a
+    end = b if which == "next_halfedge" else a
     g = half_edge(mesh, end, apex)
     mesh.curve[[g, mesh.twin[g]]] = flag
     if flag != NONE:
@@ -324,14 +337,14 @@ def graph(mesh, corners):
 
 
 def seams(mesh):
-    h = np.flatnonzero((mesh.curve >= SEAM) & (mesh.origin != DEAD)).astype(np.int32)
+    h = np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).astype(np.int32)
     return find_siblings(mesh.X, mesh.origin, h)
 
 
 def sheets_at_places(mesh):
     """Number of half-edges of every edge on a seam, by its place."""
     found = {}
-    for h in np.flatnonzero((mesh.curve >= SEAM) & (mesh.origin != DEAD)).tolist():
+    for h in np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).tolist():
         edge = frozenset(tuple(mesh.X[v, :3]) for v in (mesh.origin[h], mesh.origin[next_of(h)]))
         found[edge] = found.get(edge, 0) + 1
     return found
@@ -413,7 +426,7 @@ def slit_tube(n, m=6):
     cut = (mesh.twin == NONE) & (ends[0] % (n * m) < m) & (ends[1] % (n * m) < m)
     members, group = find_siblings(mesh.X, mesh.origin, np.flatnonzero(cut).astype(np.int32))
     assert np.array_equal(group, np.arange(0, 2 * m, 2))
-    mesh.curve[members] += SEAM
+    mesh.curve[members] += NON_MANIFOLD
     return mesh, members, group
 
 

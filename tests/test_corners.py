@@ -8,10 +8,10 @@ import pytest
 import zoo
 from structure import built, links_of, mean_edge_of, next_of
 
-from remeshvec._types import NONE
-from remeshvec.corners import find_corners
-from remeshvec.creases import find_creases
-from remeshvec.curves import link_chains
+from remeshvec.core.vocabulary import NONE
+from remeshvec.features.corners import find_corners
+from remeshvec.features.creases import find_creases
+from remeshvec.features.curves import link_chains
 
 
 def corners_of(V, F, length, angle=None, hard=(), creases=None):

@@ -8,10 +8,10 @@ import pytest
 import zoo
 from structure import built, mean_edge_of, next_of
 
-from remeshvec._echo import echo_cosines, echoes_beside
-from remeshvec._jit import kernel
-from remeshvec._types import NONE
-from remeshvec.creases import find_creases
+from remeshvec.core.compiler import kernel
+from remeshvec.core.vocabulary import NONE
+from remeshvec.features.creases import find_creases
+from remeshvec.features.echo import echo_cosines, echoes_beside
 
 
 def found_in(V, F, length, angle="auto", hard=()):

@@ -6,8 +6,8 @@ import zoo
 from scipy.spatial import ConvexHull
 from structure import built
 
-from remeshvec._types import NONE
-from remeshvec.curvature import _part_fans, largest_curvature
+from remeshvec.core.vocabulary import NONE
+from remeshvec.sizing.curvature import _part_fans, largest_curvature
 
 
 def curvature(V, F):

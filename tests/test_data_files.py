@@ -7,8 +7,9 @@ import pytest
 import textured
 
 from remeshvec import MeshFormatError, read_mesh
-from remeshvec.data_files import read_data, remesh_file, write_data
-from remeshvec.mesh_data import MeshData
+from remeshvec.batch.one_file import remesh_file
+from remeshvec.files.with_data import read_data, write_data
+from remeshvec.interop.mesh_data import MeshData
 
 RED_AND_BLUE = np.array([[255, 0, 0], [0, 0, 255]], np.uint8)
 

@@ -25,21 +25,22 @@ from structure import (
 )
 
 import remeshvec
-from remeshvec import _jit, extract
-from remeshvec._types import FIXED, NONE
-from remeshvec.bvh import Surface, closest_faces
+from remeshvec.core import compiler as _jit
+from remeshvec.core.vocabulary import FIXED, NONE
+from remeshvec.input.prepare import prepare
 from remeshvec.operations.bisect import bisect_edges
+from remeshvec.operations.classify import classify_edges
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.flip import FlipLimits, flip_edges
-from remeshvec.operations.measure import measure_edges
 from remeshvec.operations.project import project_curves, read_lengths
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
 from remeshvec.operations.unfold import undo_folds
 from remeshvec.operations.untangle import approach_vertices, untangle_vertices
-from remeshvec.prepare import prepare
+from remeshvec.output import extract
+from remeshvec.reference.bvh import Surface, closest_faces
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -65,10 +66,10 @@ def phases():
     """Name and call of every phase; a call gets mesh, blocks, reference and the build to use."""
     collapses = CollapseLimits(0.8, 4 / 3, 0.9, 0.5, False)
     flips = FlipLimits(0.7, True, False)
-    yield "measure", lambda m, b, r, p: tuple(measure_edges(m, b, 1.0, 0.8, p))
+    yield "measure", lambda m, b, r, p: tuple(classify_edges(m, b, 1.0, 0.8, p))
     yield "flip", lambda m, b, r, p: flip_edges(m, b, flips, p, passes=3)
     yield "collapse", lambda m, b, r, p: collapse_short_edges(m, b, collapses, p)
-    yield "bisect", lambda m, b, r, p: bisect_edges(m, b, measure_edges(m, b, 1.3, 0.8, p), p)
+    yield "bisect", lambda m, b, r, p: bisect_edges(m, b, classify_edges(m, b, 1.3, 0.8, p), p)
     yield "slide", lambda m, b, r, p: slide_vertices(m, b, r, p)
     for stiffness in (20.0, 0.0):
         yield "relax", lambda m, b, r, p, s=stiffness: relax_vertices(m, b, s, p)
@@ -85,13 +86,13 @@ def phases():
 
 def write_out(mesh, parallel):
     """Arrays of a mesh with removed faces and vertices, twice as large."""
-    numbers = extract._number(mesh, parallel)
+    numbers = extract._number_alive(mesh, parallel)
     assert len(numbers.faces) < len(mesh.source)
     frame = SimpleNamespace(scale=0.5, centre=np.ones(3))
     return (
         numbers.faces,
-        numbers.kept,
-        *extract._write(mesh, numbers, frame, np.dtype(np.int64), parallel),
+        numbers.vertices,
+        *extract._write_result(mesh, numbers, frame, np.dtype(np.int64), parallel),
     )
 
 
@@ -213,7 +214,7 @@ def test_results_hardly_depend_on_the_blocks(monkeypatch):
     V, F = mesh()
     L = zoo.mean_edge(V, F)
     whole = remeshvec.remesh(V, F, L)
-    monkeypatch.setattr("remeshvec.edge_sets.FACES_PER_BLOCK", 100)
+    monkeypatch.setattr("remeshvec.mesh.blocks.FACES_PER_BLOCK", 100)
     cut = remeshvec.remesh(V, F, L)
     assert len(cut.F) == pytest.approx(len(whole.F), rel=0.03)
     a, b = whole.report.quality_after, cut.report.quality_after
@@ -225,7 +226,7 @@ SCRIPT = """
 import hashlib, json, sys
 import numpy as np
 from remeshvec import _threads, edge_sets, remesh
-module = sys.modules["remeshvec.sweeps"]
+module = sys.modules["remeshvec.sweeps.sweeps"]
 path, per_block, threshold, options = json.loads(sys.argv[1])
 data = np.load(path)
 edge_sets.FACES_PER_BLOCK = per_block
@@ -329,7 +330,7 @@ def test_concurrent_calls_give_the_same_bits(monkeypatch):
     """They share the threads, and may run one another's pieces."""
     from concurrent.futures import ThreadPoolExecutor
 
-    monkeypatch.setattr(sys.modules["remeshvec.sweeps"], "_PARALLEL_FACES", 0)
+    monkeypatch.setattr(sys.modules["remeshvec.sweeps.sweeps"], "_PARALLEL_FACES", 0)
     V, F = mesh()
     expected = remeshvec.remesh(V, F, 0.15, threads=1)
     with ThreadPoolExecutor(4) as pool:

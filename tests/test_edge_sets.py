@@ -9,11 +9,11 @@ import zoo
 from holes import with_room
 from structure import assert_same_bits, blocks_of, built, copied, half_edge, tree_of
 
-from remeshvec import edge_sets
-from remeshvec._types import DEAD, Blocks
-from remeshvec.edge_sets import OWNED, SHIFTED, list_range, per_stage_block, vertex_range
+from remeshvec.core.vocabulary import DEAD, Blocks
+from remeshvec.mesh import blocks as edge_sets
+from remeshvec.mesh.blocks import OWNED, SHIFTED, list_range, per_stage_block, vertex_range
 from remeshvec.operations import bisect, collapse, flip, untangle
-from remeshvec.operations.measure import measure_edges
+from remeshvec.operations.classify import classify_edges
 
 
 @pytest.mark.parametrize("per_block", [4, 17, 50, 10_000])
@@ -182,7 +182,7 @@ def bisect_owned(V, F, a, b):
     origin = np.where(mesh.origin == DEAD, DEAD, order[mesh.origin]).astype(np.int32)
     mesh = mesh._replace(origin=origin, **{name: getattr(mesh, name)[order] for name in columns})
     blocks = Blocks(np.array([0, m + 2, m + 2]), np.array([0, n, n + 1]))
-    mask = measure_edges(mesh, blocks, 1.0, 0.0, False).mask
+    mask = classify_edges(mesh, blocks, 1.0, 0.0, False).mask
     done, left = np.zeros(2, np.int64), np.zeros(2, np.int64)
     bisect._bisect(False, mesh, blocks, OWNED, 0.5, 0.0, mask, done, left)
     assert done.any() != left.any()

@@ -6,7 +6,7 @@ import zoo
 from scipy.spatial.transform import Rotation
 
 from remeshvec import Editor, OptionError, SingularSystemError, deform
-from remeshvec.fairing import Polyharmonic
+from remeshvec.modelling.fairing import Polyharmonic
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_moves_start_from_rest_and_cost_no_factor(tube, monkeypatch):
     def never(*_, **__):
         raise AssertionError("factored again")
 
-    monkeypatch.setattr("remeshvec.solver._factored", never)
+    monkeypatch.setattr("remeshvec.modelling.solver._factorise", never)
     editor.move(rigid((0, 0, 1), (0, 0, 2)))
     solves = []
     solve = editor._system.solver.solve

@@ -5,7 +5,7 @@ import pytest
 import zoo
 
 from remeshvec import MeshInputError, OptionError, SingularSystemError, fair, remesh
-from remeshvec.fairing import Polyharmonic
+from remeshvec.modelling.fairing import Polyharmonic
 
 
 def sheet(n, uneven=0.0):

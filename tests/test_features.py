@@ -6,13 +6,13 @@ import pytest
 import zoo
 from structure import built
 
-from remeshvec._types import FIXED
-from remeshvec.features import LEAST_TURN, apexes
-from remeshvec.turns import find_turns
+from remeshvec.core.vocabulary import FIXED
+from remeshvec.features.dihedral import find_dihedral_angles
+from remeshvec.features.tips import LEAST_TURN, find_tips
 
 
 def tips_of(mesh, degrees=LEAST_TURN):
-    return apexes(mesh, find_turns(mesh.X, mesh.origin, mesh.twin, degrees, False))
+    return find_tips(mesh, find_dihedral_angles(mesh.X, mesh.origin, mesh.twin, degrees, False))
 
 
 def apexes_of(V, F, length):
@@ -105,5 +105,5 @@ def test_slivers_at_a_tip_do_not_hide_it():
         V = np.vstack([V, (V[a] + V[tip]) / 2])
         faces += [[tip, a, middle], [middle, a, b], [tip, middle, b]]
     mesh = built(V, faces, length=0.5)
-    assert find_turns(mesh.X, mesh.origin, mesh.twin, LEAST_TURN, False).slivers
+    assert find_dihedral_angles(mesh.X, mesh.origin, mesh.twin, LEAST_TURN, False).slivers
     assert 24 in tips_of(mesh)

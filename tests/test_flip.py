@@ -18,7 +18,7 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import FIXED, FROZEN, HALTED, NONE, SEAM, Blocks
+from remeshvec.core.vocabulary import FIXED, FROZEN, HALTED, NON_MANIFOLD, NONE, Blocks
 from remeshvec.operations.flip import (
     FLIPPED,
     GONE,
@@ -116,7 +116,7 @@ def alone(mesh, a, b):
 
 
 def restore(mesh):
-    from remeshvec.halfedge import build_mesh
+    from remeshvec.mesh.halfedge import build_mesh
 
     fresh, *_ = build_mesh(mesh.X.copy(), mesh.origin.reshape(-1, 3).copy())
     mesh.valence_excess[:] = fresh.valence_excess
@@ -242,7 +242,7 @@ def test_ties_do_not_flip_back_and_forth():
 # --- curves --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("flag", [0, 7, 7 + SEAM, FROZEN, HALTED])
+@pytest.mark.parametrize("flag", [0, 7, 7 + NON_MANIFOLD, FROZEN, HALTED])
 def test_edges_on_curves_do_not_flip(flag):
     """However much it would gain."""
     V, F = dart(-0.5)
@@ -268,7 +268,7 @@ def test_flags_travel_with_their_edges():
     quad = [f for f in F.tolist() if {a, b} <= set(f)]
     c, d = (next(v for v in f if v not in (a, b)) for f in quad)
     for side in ((a, c), (c, b), (b, d), (d, a)):
-        for flag in (7, 7 + SEAM, FROZEN, HALTED):
+        for flag in (7, 7 + NON_MANIFOLD, FROZEN, HALTED):
             mesh = built(V, F)
             alone(mesh, a, b)
             h = half_edge(mesh, *side)

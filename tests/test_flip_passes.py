@@ -16,8 +16,8 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import DEAD
-from remeshvec.edge_sets import stages
+from remeshvec.core.vocabulary import DEAD
+from remeshvec.mesh.blocks import stages
 from remeshvec.operations import flip
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.flip import (

@@ -7,7 +7,7 @@ import pytest
 import zoo
 from structure import built
 
-from remeshvec import geometry
+from remeshvec.core import geometry
 from remeshvec.operations import flip
 
 RNG = np.random.default_rng(5)

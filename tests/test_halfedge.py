@@ -7,11 +7,12 @@ import topology
 import zoo
 from structure import assert_same_bits, assert_valid, built, copied, faces_of, half_edge, walk
 
-from remeshvec._types import CURVE, DEAD, FIXED, INNER, NONE
-from remeshvec.edge_sets import make_blocks
-from remeshvec.halfedge import build_mesh, following, previous
+from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, INNER, NONE
+from remeshvec.mesh.blocks import make_blocks
+from remeshvec.mesh.halfedge import build_mesh
+from remeshvec.mesh.morton import order_mesh
+from remeshvec.mesh.walk import next_halfedge, previous_halfedge
 from remeshvec.operations.split import compact
-from remeshvec.order import order_mesh
 
 TINY = ["triangle", "square", "tetrahedron", "octahedron", "sliver_fan"]
 
@@ -31,9 +32,9 @@ def build_dirty(V, F):
 
 def test_following_and_previous_stay_in_the_face():
     for h in range(12):
-        assert following(h) // 3 == previous(h) // 3 == h // 3
-        assert following(previous(h)) == previous(following(h)) == h
-        assert following(h) == 3 * (h // 3) + (h + 1) % 3
+        assert next_halfedge(h) // 3 == previous_halfedge(h) // 3 == h // 3
+        assert next_halfedge(previous_halfedge(h)) == previous_halfedge(next_halfedge(h)) == h
+        assert next_halfedge(h) == 3 * (h // 3) + (h + 1) % 3
 
 
 @pytest.mark.parametrize("name", zoo.TIDY)
@@ -63,8 +64,8 @@ def test_a_walk_visits_the_one_ring(name):
     ring = naive.neighbours(F)
     for v in range(len(V)):
         met = walk(mesh.origin.tolist(), mesh.twin.tolist(), int(mesh.vertex_halfedge[v]))
-        found = {int(mesh.origin[following(h)]) for h in met}
-        found |= {int(mesh.origin[previous(h)]) for h in met}
+        found = {int(mesh.origin[next_halfedge(h)]) for h in met}
+        found |= {int(mesh.origin[previous_halfedge(h)]) for h in met}
         assert found == ring[v]
 
 
@@ -77,7 +78,7 @@ def test_boundary_half_edges_form_loops():
         while h not in seen:
             seen.add(h)
             length += 1
-            h = int(mesh.vertex_halfedge[mesh.origin[following(h)]])
+            h = int(mesh.vertex_halfedge[mesh.origin[next_halfedge(h)]])
             assert mesh.twin[h] == NONE
         if length:
             assert h == first
@@ -195,4 +196,4 @@ def test_compact_drops_what_is_dead():
 def test_half_edge_finds_what_it_should():
     mesh = built(*zoo.square())
     h = half_edge(mesh, 0, 2)
-    assert mesh.origin[h] == 0 and mesh.origin[following(h)] == 2
+    assert mesh.origin[h] == 0 and mesh.origin[next_halfedge(h)] == 2

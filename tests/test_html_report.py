@@ -18,11 +18,12 @@ import pytest
 import zoo
 
 import remeshvec
-from remeshvec import _page_views, html_page, html_report, remesh, write_html
-from remeshvec.cli import main
+from remeshvec import html_page, html_report, remesh, write_html
+from remeshvec.cli.command import main
 from remeshvec.errors import MeshFormatError, OptionError, RemeshvecError
-from remeshvec.mesh_files import write_mesh
-from remeshvec.quality import elements, quality
+from remeshvec.files.plain import write_mesh
+from remeshvec.html_page import views as _page_views
+from remeshvec.measures.quality import elements, quality
 
 pytest.importorskip("plotly")
 
@@ -149,7 +150,7 @@ def test_names_cannot_break_out(result):
     assert "alert('a" not in rest and html.escape(NASTY) in rest
     assert rest.count("<script") == rest.count("</script>") == 3
     page.encode()
-    assert html_page._json(["</script><!--"]) == '["\\u003c/script\\u003e\\u003c!--"]'
+    assert html_page._page_json(["</script><!--"]) == '["\\u003c/script\\u003e\\u003c!--"]'
 
 
 def test_nothing_is_loaded(result):

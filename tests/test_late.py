@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import zoo
 
-from remeshvec import bvh, remesh
-from remeshvec.report import Late
+from remeshvec import remesh
+from remeshvec.core.lazy import Lazy
+from remeshvec.reference import bvh
 
 LATE = ("birth_face", "birth_barycentric", "vertex_map", "face_map", "feature_edges", "corners")
 DRIFTING = {"preset": "fast", "project": False}
@@ -88,7 +89,7 @@ def test_the_callers_arrays_may_change_before_births_are_asked_for():
 
 def test_threads_get_one_value():
     made = []
-    late = Late(lambda: made.append(1) or np.arange(3))
+    late = Lazy(lambda: made.append(1) or np.arange(3))
     with ThreadPoolExecutor(8) as pool:
         values = list(pool.map(lambda _: late(), range(64)))
     assert len(made) == 1 and all(value is values[0] for value in values)
@@ -111,7 +112,7 @@ def test_a_failure_is_tried_again():
             raise answer
         return answer
 
-    late = Late(make)
+    late = Lazy(make)
     with pytest.raises(MemoryError):
         late()
     assert late() == late() == 7

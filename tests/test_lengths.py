@@ -13,10 +13,10 @@ from scipy.sparse.csgraph import shortest_path
 from structure import built, cut_open, featured
 
 from remeshvec import Adaptive, OptionError, remesh
-from remeshvec.constraints import make_constraints
-from remeshvec.lengths import bound_gradation, check_gradation, measure, set_lengths
-from remeshvec.prepare import prepare
-from remeshvec.seams import copies_on_seams
+from remeshvec.input.constraints import make_constraints
+from remeshvec.input.prepare import prepare
+from remeshvec.reference.non_manifold import non_manifold_copies
+from remeshvec.sizing.target_lengths import bound_gradation, check_gradation, mesh_size, set_lengths
 
 
 def prepared(V, F):
@@ -27,9 +27,9 @@ def lengths(result, L, V=None, gradation=1.5, max_faces=10**9):
     """Set lengths; returns the length of the mean new face and those of all vertices, in V's units."""
     V = result.mesh.X[:, :3] / result.scale + result.centre if V is None else np.asarray(V, float)
     marks = make_constraints(len(V), F_of(result)).on_mesh(
-        result.mesh, result.vertex_source, result.face_source, result.same
+        result.mesh, result.vertex_source, result.face_source, result.representative
     )
-    mean = set_lengths(result, measure(result), V, L, marks, None, gradation, max_faces)
+    mean = set_lengths(result, mesh_size(result), V, L, marks, None, gradation, max_faces)
     return mean / result.scale, result.mesh.X[:, 3] / result.scale
 
 
@@ -42,7 +42,7 @@ def F_of(result):
 def test_measures(name):
     V, F = zoo.ZOO[name].make()
     result = prepared(1000 * V, F)
-    found = measure(result)
+    found = mesh_size(result)
     edges = igl.edges(F)
     mean = np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1).mean()
     assert found.mean_edge / result.scale == pytest.approx(1000 * mean)
@@ -243,7 +243,7 @@ def test_bounding_keeps_copies_alike(name):
     V, F = known.make()
     mesh, source = cut_open(V, F)
     built = featured(mesh, np.random.default_rng(1).uniform(0.05, 1.5, len(V))[source], source)
-    bound_gradation(mesh, 1.3, copies_on_seams(mesh, built))
+    bound_gradation(mesh, 1.3, non_manifold_copies(mesh, built))
     low, high = np.full(len(V), np.inf), np.zeros(len(V))
     np.minimum.at(low, source, mesh.X[:, 3])
     np.maximum.at(high, source, mesh.X[:, 3])

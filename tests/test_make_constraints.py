@@ -8,8 +8,8 @@ import zoo
 from structure import built, curve_edges, cut_open, half_edges, next_of
 
 from remeshvec import OptionError
-from remeshvec._types import NONE
-from remeshvec.constraints import make_constraints
+from remeshvec.core.vocabulary import NONE
+from remeshvec.input.constraints import make_constraints
 
 V, F = zoo.grid(5, 4)
 N, M = len(V), len(F)  # 20 vertices, 24 faces

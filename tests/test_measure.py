@@ -6,9 +6,9 @@ import pytest
 import zoo
 from structure import assert_same_bits, blocks_of, built, copied, next_of, one_block
 
-from remeshvec._types import DEAD, FROZEN, HALTED, NONE, SEAM
+from remeshvec.core.vocabulary import DEAD, FROZEN, HALTED, NON_MANIFOLD, NONE
+from remeshvec.operations.classify import REMOVED, classify_edges, is_short
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
-from remeshvec.operations.measure import REMOVED, is_short, measure_edges
 from remeshvec.operations.split import split_long_edges
 
 MESHES = ["torus", "planar_delaunay", "annulus", "genus_2", "sliver_fan", "l_prism", "moebius"]
@@ -29,7 +29,7 @@ def freeze_some(mesh, seed=0):
     rng = np.random.default_rng(seed)
     for h in np.flatnonzero((mesh.origin != DEAD) & (mesh.twin < np.arange(len(mesh.twin)))):
         if rng.random() < 0.25:
-            mesh.curve[h] = flag = rng.choice([FROZEN, HALTED, 5, 5 + SEAM])
+            mesh.curve[h] = flag = rng.choice([FROZEN, HALTED, 5, 5 + NON_MANIFOLD])
             if mesh.twin[h] != NONE:
                 mesh.curve[mesh.twin[h]] = flag
 
@@ -58,7 +58,7 @@ def test_flags_are_those_of_plain_loops(name, seed, per_block, monkeypatch):
     mesh = uneven(name, seed)
     freeze_some(mesh, seed)
     before = copied(mesh)
-    flags = measure_edges(mesh, blocks_of(mesh, per_block, monkeypatch), 1.2, 0.9, False)
+    flags = classify_edges(mesh, blocks_of(mesh, per_block, monkeypatch), 1.2, 0.9, False)
     assert_same_bits(mesh, before)
     alive = mesh.origin[::3] != DEAD
     assert (flags.mask[~alive] == REMOVED).all() and flags.n_gone == (~alive).sum()
@@ -81,7 +81,7 @@ def test_both_faces_agree_on_what_is_short(name):
         limit = np.sqrt(squared) * (s + u) / (2 * s * u)
         found = set()
         for shortest in (limit * (1 - 1e-12), limit, limit * (1 + 1e-12)):
-            mask = measure_edges(mesh, one_block(mesh), 9.0, shortest, False).mask
+            mask = classify_edges(mesh, one_block(mesh), 9.0, shortest, False).mask
             bits = [bool(mask[g // 3] >> (3 + g % 3) & 1) for g in (h, t)]
             assert bits[0] == bits[1] == is_short(squared, s, u, shortest)
             found.add(bits[0])
@@ -90,14 +90,14 @@ def test_both_faces_agree_on_what_is_short(name):
 
 def test_nothing_is_longer_than_infinity_or_shorter_than_nothing():
     mesh = uneven("torus")
-    flags = measure_edges(mesh, one_block(mesh), np.inf, 0.0, False)
+    flags = classify_edges(mesh, one_block(mesh), np.inf, 0.0, False)
     assert flags.n_long == 0 and not flags.mask[mesh.origin[::3] != DEAD].any()
 
 
 def test_edges_without_length():
     """Short for any factor above zero, never long."""
     mesh = built(*zoo.ZOO["coincident_vertices"].make())
-    flags = measure_edges(mesh, one_block(mesh), 1e-9, 1e-9, False)
+    flags = classify_edges(mesh, one_block(mesh), 1e-9, 1e-9, False)
     V = mesh.X[:, :3]
     for h in range(len(mesh.origin)):
         empty = (V[mesh.origin[h]] == V[mesh.origin[next_of(h)]]).all()
@@ -112,13 +112,13 @@ def test_known_flags_change_nothing(name, per_block, monkeypatch):
     mesh = uneven(name)
     blocks = blocks_of(mesh, per_block, monkeypatch)
     told, other = copied(mesh), copied(mesh)
-    flags = measure_edges(mesh, blocks, LIMITS.longest, LIMITS.shortest, False)
+    flags = classify_edges(mesh, blocks, LIMITS.longest, LIMITS.shortest, False)
     one = split_long_edges(told, blocks, LIMITS.longest, False, None, flags)
     two = split_long_edges(other, blocks, LIMITS.longest, False)
     assert one[1] == two[1] > 0
     assert_same_bits(one[0], two[0])
     told, other = copied(mesh), copied(mesh)
-    flags = measure_edges(mesh, blocks, LIMITS.longest, LIMITS.shortest, False)
+    flags = classify_edges(mesh, blocks, LIMITS.longest, LIMITS.shortest, False)
     tallies = [collapse_short_edges(told, blocks, LIMITS, False, flags),
                collapse_short_edges(other, blocks, LIMITS, False)]  # fmt: skip
     assert np.array_equal(*tallies) and tallies[0].any()

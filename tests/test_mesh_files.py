@@ -13,7 +13,7 @@ import pytest
 from hostile_files import HOSTILE, LEGAL, OBJ, OFF, F, V, as_json, binary_ply, ply, stl
 
 from remeshvec.errors import MeshFormatError
-from remeshvec.mesh_files import SUFFIXES, check_writable, read_mesh, write_file, write_mesh
+from remeshvec.files.plain import SUFFIXES, check_writable, read_mesh, write_file, write_mesh
 
 SAMPLES = Path(__file__).parents[2] / "shared" / "data" / "samples"
 
@@ -131,7 +131,7 @@ def test_missing_file_folder_and_device(tmp_path):
 
 
 def test_file_beyond_the_size_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr("remeshvec._file_guards.MAX_BYTES", 10)
+    monkeypatch.setattr("remeshvec.files.guards.MAX_BYTES", 10)
     (tmp_path / "a.obj").write_bytes(OBJ)
     with pytest.raises(MeshFormatError, match="the limit is 10"):
         read_mesh(tmp_path / "a.obj")

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.shapes import bumpy_bar
 from remeshvec import MultiresolutionEditor, OptionError, fair, surface_distance
-from remeshvec.motion import part_of_motion, rotations_between
+from remeshvec.modelling.motion import part_of_motion, rotations_between
 
 LENGTH = 6.0
 

@@ -9,7 +9,7 @@ import textured
 import zoo
 
 from remeshvec import MeshInputError, OptionError, RemeshResult, remesh, remesh_many
-from remeshvec.mesh_data import split_vertices
+from remeshvec.interop.mesh_data import split_vertices
 
 V, F, UV = textured.cube(4)
 L = 0.3

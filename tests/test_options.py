@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from remeshvec import OptionError, remesh
-from remeshvec._threads import available_threads
-from remeshvec.options import PRESETS, make_options
-from remeshvec.remesh import RemeshOptions
+from remeshvec.core.threads import available_threads
+from remeshvec.input.options import PRESETS, make_options
+from remeshvec.pipeline.remesh import RemeshOptions
 
 
 def options(preset="default", **overrides):

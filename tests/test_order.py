@@ -5,7 +5,7 @@ import pytest
 import zoo
 from pieces import on_threads, shuffled
 
-from remeshvec.order import order_mesh, survey
+from remeshvec.mesh.morton import order_mesh, survey
 
 
 def ordered(V, F, parallel=False):

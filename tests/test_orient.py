@@ -10,8 +10,8 @@ import zoo
 from hypothesis import given
 from hypothesis import strategies as st
 
-from remeshvec.orient import orient_faces
-from remeshvec.twins import match_half_edges
+from remeshvec.mesh.orient import orient_faces
+from remeshvec.mesh.twins import match_halfedges
 
 CLOSED = ["icosphere", "torus", "genus_3"]
 OPEN = ["annulus", "grid", "planar_delaunay", "sliver_fan"]
@@ -319,7 +319,7 @@ def test_random_faces_are_flipped_as_the_naive_twin_does(seed):
 @pytest.mark.parametrize("seed", range(40))
 def test_the_check_counts_what_is_inconsistent(seed, parallel):
     F = proper(np.random.default_rng(seed).integers(0, 8, (20, 3)))
-    pairs = match_half_edges(F.reshape(-1), 8, parallel, by_winding=False)
+    pairs = match_halfedges(F.reshape(-1), 8, parallel, by_winding=False)
     assert pairs.found.inconsistent_edges == len(inconsistent_edges(F))
     users = topology.edge_faces(F)
     assert pairs.found.non_manifold_edges == sum(len(faces) > 2 for faces in users.values())

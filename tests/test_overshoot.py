@@ -14,7 +14,7 @@ from structure import (
     one_block,
 )
 
-from remeshvec._types import CURVE, DEAD, FIXED, HELD, INNER
+from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, HELD, INNER
 from remeshvec.operations.collapse import COLLAPSED, CollapseLimits, collapse_short_edges
 from remeshvec.operations.rings import KEPT_CURVE, KEPT_OVERSHOOT
 

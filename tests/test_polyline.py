@@ -10,10 +10,10 @@ import pytest
 import zoo
 from structure import built, cut_open, draw, featured, links_of, next_of
 
-from remeshvec._jit import kernel
-from remeshvec._types import FIXED, NONE, SEAM
-from remeshvec.curves import link_chains
-from remeshvec.polyline import (
+from remeshvec.core.compiler import kernel
+from remeshvec.core.vocabulary import FIXED, NON_MANIFOLD, NONE
+from remeshvec.features.curves import link_chains
+from remeshvec.features.polyline import (
     closest_on_curve,
     find_siblings,
     join_edges,
@@ -178,8 +178,8 @@ def test_an_edge_has_one_name_on_all_its_sides(name):
         assert found[half_edges].tolist() == [min(half_edges)] * len(half_edges)
     # What the marks in the mesh say, but for those that stay.
     moving = mesh.curve >= 0
-    assert np.array_equal(mesh.curve[moving] & (SEAM - 1), found[moving])
-    assert (mesh.curve >= SEAM).sum() == len(siblings_of(mesh)[0])
+    assert np.array_equal(mesh.curve[moving] & (NON_MANIFOLD - 1), found[moving])
+    assert (mesh.curve >= NON_MANIFOLD).sum() == len(siblings_of(mesh)[0])
 
 
 # --- who follows whom ----------------------------------------------------------------------------
@@ -355,7 +355,7 @@ def curves(V, F, length=1.0, **wanted):
     """Mesh, who follows whom on its curves, and the names of their edges."""
     mesh = built(V, F)
     reference = featured(mesh, length, **wanted).reference
-    return mesh, reference.beside, np.unique(mesh.curve[mesh.curve >= 0])
+    return mesh, reference.curve_neighbours, np.unique(mesh.curve[mesh.curve >= 0])
 
 
 def disc(n, radius=1.0):

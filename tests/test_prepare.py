@@ -7,15 +7,17 @@ import zoo
 from pieces import on_threads, shuffled
 from structure import assert_same_bits, assert_valid, faces_of, shape_of
 
-from remeshvec import MeshInputError, _jit, order
-from remeshvec.clean import (
+from remeshvec import MeshInputError
+from remeshvec.core import compiler as _jit
+from remeshvec.input.prepare import prepare
+from remeshvec.mesh import morton
+from remeshvec.mesh.repair import (
     _WEIGHTS,
     drop_degenerate_faces,
     drop_duplicate_faces,
     weld_vertices,
 )
-from remeshvec.lengths import measure
-from remeshvec.prepare import prepare
+from remeshvec.sizing.target_lengths import mesh_size
 
 
 def prepared(V, F):
@@ -37,7 +39,7 @@ def test_tidy_meshes_pass_unchanged(name):
     assert_valid(result.mesh)
     assert shape_of(faces_of(result.mesh)) == shape_of(F)
     assert_in_place(result, V, F)
-    assert result.same is None and result.flipped is None
+    assert result.representative is None and result.flipped is None
 
 
 def assert_in_place(result, V, F):
@@ -47,7 +49,7 @@ def assert_in_place(result, V, F):
         F = np.where(result.flipped[:, None], F[:, [0, 2, 1]], F)
     F = F[result.face_source]
     assert np.array_equal(in_input_frame(result)[faces_of(result.mesh)], V[F])
-    same = np.arange(len(V)) if result.same is None else result.same
+    same = np.arange(len(V)) if result.representative is None else result.representative
     assert np.array_equal(result.vertex_source[faces_of(result.mesh)], same[F])
 
 
@@ -100,7 +102,7 @@ def test_seams_are_not_counted_as_pinched_but_other_vertices_are():
 def test_faces_without_area_are_counted(name):
     V, F = zoo.ZOO[name].make()
     result = prepared(V, F)
-    measure(result)
+    mesh_size(result)
     flat = sum(np.linalg.norm(np.cross(V[b] - V[a], V[c] - V[a])) == 0 for a, b, c in F)
     assert result.dirt == {"zero_area_faces": flat}
 
@@ -229,14 +231,14 @@ def test_any_array_will_do():
     """Read-only ones, and faces of 32 bits, are neither changed nor compiled for."""
     V, F = zoo.torus()
     one = prepare(V, F, False)
-    kernels = [value for value in vars(order).values() if isinstance(value, _jit.kernel)]
-    before = [len(kernel.compiled.signatures) for kernel in kernels if kernel is not order._survey]
+    kernels = [value for value in vars(morton).values() if isinstance(value, _jit.kernel)]
+    before = [len(kernel.compiled.signatures) for kernel in kernels if kernel is not morton._survey]
     for dtype in (np.int32, np.int64):
         fixed = V.copy(), F.astype(dtype)
         for array in fixed:
             array.setflags(write=False)
         assert_same_bits(prepare(*fixed, False).mesh, one.mesh)
-    after = [len(kernel.compiled.signatures) for kernel in kernels if kernel is not order._survey]
+    after = [len(kernel.compiled.signatures) for kernel in kernels if kernel is not morton._survey]
     assert before == after
 
 
@@ -341,4 +343,4 @@ def test_no_surface():
     with pytest.raises(MeshInputError, match="one place"):
         prepared(np.ones((3, 3)), [[0, 1, 2]])
     with pytest.raises(MeshInputError, match="no area"):
-        measure(prepared([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]))
+        mesh_size(prepared([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]))

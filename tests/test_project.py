@@ -17,7 +17,7 @@ from structure import (
     referenced,
 )
 
-from remeshvec._types import CURVE, DEAD, FIXED, HELD, INNER, NONE
+from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, HELD, INNER, NONE
 from remeshvec.operations.project import project_curves, project_vertices, read_lengths
 
 MESHES = ["icosphere", "torus", "genus_2", "planar_delaunay", "annulus", "grid", "two_components"]

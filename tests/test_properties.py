@@ -21,12 +21,14 @@ from structure import (
 )
 
 from remeshvec import remesh
-from remeshvec._types import DEAD, FIXED, SEAM
-from remeshvec.edge_sets import make_blocks
+from remeshvec.core.vocabulary import DEAD, FIXED, NON_MANIFOLD
+from remeshvec.features.polyline import find_siblings
+from remeshvec.input.prepare import prepare
+from remeshvec.mesh.blocks import make_blocks
+from remeshvec.operations.classify import classify_edges
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.flip import FlipLimits, flip_edges
-from remeshvec.operations.measure import measure_edges
 from remeshvec.operations.project import read_lengths
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.siblings import collapse_siblings
@@ -34,8 +36,6 @@ from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
 from remeshvec.operations.unfold import undo_folds
 from remeshvec.operations.untangle import approach_vertices, untangle_vertices
-from remeshvec.polyline import find_siblings
-from remeshvec.prepare import prepare
 
 MESHES = st.fixed_dictionaries(
     {
@@ -109,7 +109,7 @@ class Phases:
     """
 
     def __init__(self, V, F, length, options, controls, patch):
-        patch.setattr("remeshvec.edge_sets.FACES_PER_BLOCK", options["per_block"])
+        patch.setattr("remeshvec.mesh.blocks.FACES_PER_BLOCK", options["per_block"])
         prepared = prepare(V, F, False)
         self.o = options
         self.mesh = mesh = prepared.mesh
@@ -181,10 +181,10 @@ class Phases:
     def one_round(self, mesh, parallel):
         siblings = find_siblings(mesh.X, mesh.origin, on_seams(mesh)) if self.slits else None
         longest, shortest = self.o["split"], self.o["collapse"]
-        flags = measure_edges(mesh, self.blocks, longest, shortest, parallel)
+        flags = classify_edges(mesh, self.blocks, longest, shortest, parallel)
         refined, _ = split_long_edges(mesh, self.blocks, longest, parallel, siblings, flags)
         if refined is mesh:
-            fresh = measure_edges(mesh, self.blocks, longest, shortest, parallel)
+            fresh = classify_edges(mesh, self.blocks, longest, shortest, parallel)
             assert np.array_equal(flags.mask, fresh.mask) and fresh.n_long == 0
         return refined
 
@@ -198,7 +198,7 @@ class Phases:
         """With the flags that are known, and without."""
         other = copied(mesh)
         longest, shortest = self.limits.longest, self.limits.shortest
-        flags = measure_edges(mesh, self.blocks, longest, shortest, parallel)
+        flags = classify_edges(mesh, self.blocks, longest, shortest, parallel)
         tallies = [
             collapse_short_edges(m, self.blocks, self.limits, parallel, f)
             for m, f in ((mesh, flags), (other, None))
@@ -251,7 +251,7 @@ def void(_):
 
 
 def on_seams(mesh):
-    return np.flatnonzero((mesh.curve >= SEAM) & (mesh.origin != DEAD)).astype(np.int32)
+    return np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).astype(np.int32)
 
 
 def held(mesh):

@@ -11,9 +11,9 @@ import zoo
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from remeshvec.distance import surface_distance
 from remeshvec.errors import MeshInputError, OptionError
-from remeshvec.quality import quality, side_by_side
+from remeshvec.measures.distance import surface_distance
+from remeshvec.measures.quality import quality, side_by_side
 
 # What other tools were compared on; percent and degrees.
 PUBLISHED = {  # E face, E Voronoi, CV, min, p1, mean of min angles, valence 6

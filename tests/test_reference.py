@@ -17,8 +17,8 @@ from structure import (
     referenced,
 )
 
-from remeshvec._types import CURVE, FIXED, FROZEN, HELD, INNER, NONE, SEAM
-from remeshvec.prepare import prepare
+from remeshvec.core.vocabulary import CURVE, FIXED, FROZEN, HELD, INNER, NON_MANIFOLD, NONE
+from remeshvec.input.prepare import prepare
 
 ROWS = 9
 
@@ -57,7 +57,7 @@ def patches_of(mesh, reference):
 def assert_built(mesh, result):
     """What must always hold of a mesh with marked features and its reference."""
     reference = result.reference
-    assert_valid(mesh, slits=result.on_seam is not None)
+    assert_valid(mesh, slits=result.on_non_manifold is not None)
     assert_on_reference(mesh, reference)
     assert np.array_equal(reference.X[:, :3], mesh.X[:, :3])
     assert np.array_equal(reference.origin, mesh.origin)
@@ -72,7 +72,9 @@ def assert_built(mesh, result):
         h = int(mesh.birth[v])
         places = reference.X[[mesh.origin[h], mesh.origin[next_of(h)]], :3]
         assert (places == mesh.X[v, :3]).all(axis=1).any()
-        assert mesh.birth[v] == mesh.curve[h] & (SEAM - 1), "born on an edge that is no name"
+        assert mesh.birth[v] == mesh.curve[h] & (NON_MANIFOLD - 1), (
+            "born on an edge that is no name"
+        )
 
 
 @pytest.mark.parametrize("name", zoo.TIDY)
@@ -82,7 +84,7 @@ def test_every_shape(name):
         mesh = built(V, F, ordered=True)
         result = featured(mesh, zoo.mean_edge(V, F), feature_angle=angle)
         assert_built(mesh, result)
-        assert result.on_seam is None and result.held is None
+        assert result.on_non_manifold is None and result.held is None
         assert result.has_curves == bool(curve_edges(mesh))
 
 
@@ -96,13 +98,13 @@ def test_every_complex(name):
     for corner in known.corners:
         assert places[(np.asarray(corner, float) + 0.0).tobytes()]
     # Sheets agree: all copies of a vertex on a seam are fixed, or all slide with the same birth.
-    on_seam = np.flatnonzero(result.on_seam)
+    on_seam = np.flatnonzero(result.on_non_manifold)
     for s in np.unique(source[on_seam]):
         copies = np.flatnonzero(source == s)
         assert len({int(k) for k in mesh.kind[copies]}) == 1
         if mesh.kind[copies[0]] == CURVE:
             assert len(set(mesh.birth[copies].tolist())) == 1
-    _, sheets = np.unique(mesh.curve[mesh.curve >= SEAM], return_counts=True)
+    _, sheets = np.unique(mesh.curve[mesh.curve >= NON_MANIFOLD], return_counts=True)
     assert set(sheets.tolist()) == set(known.curves)
 
 
@@ -197,7 +199,7 @@ def test_fixed_vertices_stay_wherever_they_are():
     assert_built(mesh, result)
     assert (mesh.kind[chosen] == FIXED).all()
     assert (mesh.kind == FIXED).sum() == 4 + 2 + 3
-    beside = result.reference.beside
+    beside = result.reference.curve_neighbours
     for a, b in ((5, 6), (6, 7)):
         name = curve_edges(mesh)[frozenset((at(4, a), at(4, b)))]
         side = [mesh.origin[name], mesh.origin[next_of(name)]].index(at(4, 6))
@@ -224,7 +226,7 @@ def test_boundary_modes_leave_seams_alone(mode):
     mesh, source = cut_open(*known.make())
     result = featured(mesh, 0.2, vertex_source=source, boundary=mode)
     assert_built(mesh, result)
-    seam = mesh.curve >= SEAM
+    seam = mesh.curve >= NON_MANIFOLD
     assert seam.any() and (mesh.kind[mesh.origin[seam]] == CURVE).any()
     outside = (mesh.twin == NONE) & ~seam
     assert (mesh.kind[mesh.origin[outside]] == FIXED).all()
@@ -272,7 +274,7 @@ def test_lengths_beside_what_is_held_agree_on_all_sheets(wanted):
     mesh, source = cut_open(V, F)
     kept = {"boundary": "fixed"} if wanted == "boundary" else {"fixed_faces": [0, 7]}
     result = featured(mesh, 0.1, vertex_source=source, **kept)
-    assert result.on_seam.any() and mesh.X[:, 3].max() > 0.3
+    assert result.on_non_manifold.any() and mesh.X[:, 3].max() > 0.3
     low, high = np.full(len(V), np.inf), np.zeros(len(V))
     np.minimum.at(low, source, mesh.X[:, 3])
     np.maximum.at(high, source, mesh.X[:, 3])
@@ -311,7 +313,7 @@ def test_a_sheet_that_leaves_a_seam_smoothly_ends_it():
     mesh, source = cut_open(W, G)
     result = featured(mesh, 0.2, vertex_source=source, feature_angle=40.0)
     assert_built(mesh, result)
-    _, sheets = np.unique(mesh.curve[mesh.curve >= SEAM], return_counts=True)
+    _, sheets = np.unique(mesh.curve[mesh.curve >= NON_MANIFOLD], return_counts=True)
     assert set(sheets.tolist()) == {3, 4}
     middle = (mesh.X[:, :3] == 0).all(axis=1)
     assert middle.sum() == 4 and (mesh.kind[middle] == FIXED).all()
@@ -345,5 +347,5 @@ def test_corners_where_closed_parts_touch_stay_apart():
     mesh, source = cut_open(V, F)
     result = featured(mesh, 0.3, vertex_source=source, feature_angle=40.0)
     assert_built(mesh, result)
-    seam = mesh.curve >= SEAM
+    seam = mesh.curve >= NON_MANIFOLD
     assert seam.sum() == 4 and len(set(mesh.curve[seam].tolist())) == 1

@@ -7,9 +7,9 @@ import pytest
 import zoo
 from structure import assert_valid, blocks_of, built, faces_of, one_block
 
-from remeshvec._types import CURVE, FIXED, HELD, NONE, PINNED
-from remeshvec.edge_sets import stages
-from remeshvec.geometry import SHARP
+from remeshvec.core.geometry import SHARP
+from remeshvec.core.vocabulary import CURVE, FIXED, HELD, NONE, PINNED
+from remeshvec.mesh.blocks import stages
 from remeshvec.operations import relax
 from remeshvec.operations.relax import relax_vertices
 

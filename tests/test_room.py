@@ -13,10 +13,10 @@ from structure import (
     packed,
 )
 
-from remeshvec._types import DEAD, INNER
-from remeshvec.edge_sets import make_blocks
-from remeshvec.operations.measure import REMOVED, measure_edges
-from remeshvec.operations.split import ROOM, compact, split_long_edges
+from remeshvec.core.vocabulary import DEAD, INNER
+from remeshvec.mesh.blocks import make_blocks
+from remeshvec.operations.classify import REMOVED, classify_edges
+from remeshvec.operations.split import SPARE, compact, split_long_edges
 
 
 @pytest.mark.parametrize("per_block", [16, 100, 10**6])
@@ -61,11 +61,11 @@ def test_a_new_mesh_has_room_in_every_block(name, per_block, monkeypatch):
     assert count > 0
     assert_valid(refined)
     faces, vertices = numbers(refined)
-    assert ROOM * faces - len(mesh.origin) / per_block - 1 <= len(refined.source) - faces
-    assert len(refined.source) - faces <= ROOM * faces
-    assert (len(refined.X) - vertices) * 2 <= ROOM * faces
+    assert SPARE * faces - len(mesh.origin) / per_block - 1 <= len(refined.source) - faces
+    assert len(refined.source) - faces <= SPARE * faces
+    assert (len(refined.X) - vertices) * 2 <= SPARE * faces
     blocks = make_blocks(refined)
-    flags = measure_edges(refined, blocks, 0.2, 0.0, False)
+    flags = classify_edges(refined, blocks, 0.2, 0.0, False)
     assert flags.n_gone == len(refined.source) - faces
     assert (flags.mask == REMOVED).sum() == flags.n_gone
 

@@ -6,7 +6,7 @@ import pytest
 import textured
 
 from remeshvec import remesh
-from remeshvec.sides import _DETOUR, _NEARBY, _ways, locate_corners
+from remeshvec.output.sides import _DETOUR, _NEARBY, _path_lengths, locate_corners
 
 
 def provenance(V, F, uv, L):
@@ -25,7 +25,7 @@ def test_ways_are_those_of_the_twin(shape):
     birth = (p.births()[0] // 3).astype(np.int32)
     v, w = corners[:, 0].astype(np.int64), corners[:, 1]
     for goal in (birth, birth[::-1].copy()):  # their own faces, and ones far away
-        near, length = _ways(p, v, w, start, goal)
+        near, length = _path_lengths(p, v, w, start, goal)
         for i in range(len(v)):
             known, face = naive.ways(tree, start[i], goal[v[i]], X[v[i]], X[w[i]], _DETOUR, _NEARBY)
             assert length[i] == pytest.approx(known, rel=1e-9)
@@ -55,7 +55,7 @@ def test_no_way_leads_across_a_seam():
     p.mesh.X[n : 2 * n, :3] = middle[across]
     v, w = np.arange(n), np.arange(n, 2 * n).astype(np.int32)
     straight = np.linalg.norm(middle[left] - middle[across], axis=1)
-    _, own = _ways(p, v, w, place[left], birth)
-    _, length = _ways(p, v, w, place[across], birth)
+    _, own = _path_lengths(p, v, w, place[left], birth)
+    _, length = _path_lengths(p, v, w, place[across], birth)
     assert np.allclose(own, straight) and straight.max() < 0.4
     assert (length > 3.0).all()

@@ -12,16 +12,10 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from structure import built
 
-from remeshvec import gradation as gradation_module
 from remeshvec.errors import OptionError
-from remeshvec.gradation import _limit, _steepest, gradation_slope
-from remeshvec.sizing import (
-    Adaptive,
-    adaptive_lengths,
-    expected_faces,
-    limit_gradation,
-    target_lengths,
-)
+from remeshvec.sizing import gradation as gradation_module
+from remeshvec.sizing.adaptive import Adaptive, adaptive_lengths, expected_faces, target_lengths
+from remeshvec.sizing.gradation import _limit, _steepest, gradation_slope, limit_gradation
 
 
 def arrays(mesh):

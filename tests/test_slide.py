@@ -19,14 +19,14 @@ from structure import (
     packed,
 )
 
-from remeshvec._types import CURVE, FIXED, HELD, INNER, NONE, PINNED, SEAM
+from remeshvec.core.vocabulary import CURVE, FIXED, HELD, INNER, NON_MANIFOLD, NONE, PINNED
 from remeshvec.operations import slide
 from remeshvec.operations.project import project_curves
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import split_long_edges
 
-SHARE = slide.SHARE  # of the way to where the edges suit
+SHARE = slide.SLIDE_SHARE  # of the way to where the edges suit
 SHAPES = ["annulus", "cylinder", "closed_cylinder", "cube", "l_prism", "genus_2", "grid"]
 
 
@@ -57,7 +57,7 @@ class Polyline:
     """One curve of the reference in order: its edges, its corners' places and their arc lengths."""
 
     def __init__(self, reference, names, start):
-        X, beside = reference.X[:, :3], reference.beside
+        X, beside = reference.X[:, :3], reference.curve_neighbours
         self.points, self.edges, self.closed = [], [], True
         v, h = int(reference.origin[start]), start
         for first in names:  # begin at an end if there is one
@@ -88,7 +88,7 @@ class Polyline:
 
 def polylines(mesh, reference):
     """Polyline of every name."""
-    names = np.unique(mesh.curve[mesh.curve >= 0] & (SEAM - 1))
+    names = np.unique(mesh.curve[mesh.curve >= 0] & (NON_MANIFOLD - 1))
     found = {}
     todo = set(np.flatnonzero(reference.arcs[2] != 0).tolist()) | set(names.tolist())
     while todo:
@@ -98,7 +98,7 @@ def polylines(mesh, reference):
             if h in group:
                 continue
             group.add(h)
-            stack += [int(g) for g in reference.beside[:, h] if g != NONE]
+            stack += [int(g) for g in reference.curve_neighbours[:, h] if g != NONE]
         todo -= group
         line = Polyline(reference, sorted(group), min(group))
         assert set(line.edges) == group
@@ -273,7 +273,7 @@ def test_sheets_stay_together(name):
 
 def places(mesh):
     """Which ends of seams lie in the same place, as sets of vertices."""
-    h = np.flatnonzero(mesh.curve >= SEAM)
+    h = np.flatnonzero(mesh.curve >= NON_MANIFOLD)
     ends = np.unique(mesh.origin[np.concatenate([h, [next_of(g) for g in h.tolist()]])])
     at = {}
     for v in ends.tolist():

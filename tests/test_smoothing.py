@@ -5,7 +5,7 @@ import pytest
 import zoo
 
 from remeshvec import MeshInputError, OptionError, smooth
-from remeshvec.smoothing import _volume
+from remeshvec.modelling.smoothing import _volume
 
 
 def sphere(level=4, radius=2.0):

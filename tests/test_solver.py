@@ -91,7 +91,7 @@ def test_nothing_fixed_is_an_error_before_factoring(mesh, monkeypatch):
     def never(*_):
         raise AssertionError("factored")
 
-    monkeypatch.setattr("remeshvec.solver._factored", never)
+    monkeypatch.setattr("remeshvec.modelling.solver._factorise", never)
     for area in ("uniform", "voronoi"):
         with pytest.raises(SingularSystemError, match=r"nothing is fixed.*fix at least one"):
             LaplacianSolver(laplacian(*mesh, area))

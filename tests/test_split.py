@@ -15,8 +15,8 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import CURVE, FIXED, INNER
-from remeshvec.edge_sets import make_blocks
+from remeshvec.core.vocabulary import CURVE, FIXED, INNER
+from remeshvec.mesh.blocks import make_blocks
 from remeshvec.operations import templates
 from remeshvec.operations.split import MAX_ROUNDS, split_long_edges
 

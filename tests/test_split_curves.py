@@ -24,9 +24,20 @@ from structure import (
     shape_of,
 )
 
-from remeshvec._types import CURVE, DEAD, FIXED, FROZEN, HALTED, HELD, INNER, NONE, PINNED, SEAM
+from remeshvec.core.vocabulary import (
+    CURVE,
+    DEAD,
+    FIXED,
+    FROZEN,
+    HALTED,
+    HELD,
+    INNER,
+    NON_MANIFOLD,
+    NONE,
+    PINNED,
+)
+from remeshvec.features.polyline import find_siblings
 from remeshvec.operations.split import MAX_ROUNDS, compact, split_edges, split_long_edges
-from remeshvec.polyline import find_siblings
 
 ROWS = 5  # vertices of a column of `zoo.grid()`, which has 7 of them
 
@@ -212,7 +223,7 @@ def test_told_to_any_edge_is_split():
 
 
 def seams(mesh):
-    h = np.flatnonzero((mesh.curve >= SEAM) & (mesh.origin != DEAD)).astype(np.int32)
+    h = np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).astype(np.int32)
     return find_siblings(mesh.X, mesh.origin, h)
 
 
@@ -220,7 +231,7 @@ def two_sheets(reach=0.1):
     """Two faces on one edge of length 2; the first is a needle with longer sides, the second is not."""
     P = np.array([[0, 0, 0], [2, 0, 0], [2.0 + reach, 0.02, 0], [0, 0, 0], [2, 0, 0], [1, 0, 2]])
     mesh = built(P, [[0, 1, 2], [4, 3, 5]])
-    mesh.curve[[0, 3]] = SEAM
+    mesh.curve[[0, 3]] = NON_MANIFOLD
     return mesh
 
 
@@ -235,7 +246,7 @@ def test_siblings_are_split_together():
     assert_valid(refined, slits=True)
     middle = np.flatnonzero((refined.X[:, :3] == [1, 0, 0]).all(axis=1))
     assert len(middle) == 2 and (refined.kind[middle] == CURVE).all()
-    assert (refined.curve >= SEAM).sum() == 4 and len(seams(refined)[0]) == 4
+    assert (refined.curve >= NON_MANIFOLD).sum() == 4 and len(seams(refined)[0]) == 4
 
 
 def test_siblings_that_nobody_wants_split_stay():
@@ -282,7 +293,7 @@ def sibling_ends(mesh, h):
 def sheets_at_places(mesh):
     """Number of half-edges of every edge on a seam, by its place."""
     found = {}
-    for h in np.flatnonzero(mesh.curve >= SEAM).tolist():
+    for h in np.flatnonzero(mesh.curve >= NON_MANIFOLD).tolist():
         edge = tuple(tuple(mesh.X[v, :3].tolist()) for v in sibling_ends(mesh, h))
         found[edge] = found.get(edge, 0) + 1
     assert min(found.values()) > 1, "a seam came open"
@@ -327,7 +338,7 @@ def test_births_across_a_patch(kinds, births, expected):
     assert kind == INNER and birth in expected
 
 
-@pytest.mark.parametrize("curve", [7, 7 + SEAM])
+@pytest.mark.parametrize("curve", [7, 7 + NON_MANIFOLD])
 @pytest.mark.parametrize(
     ("kinds", "births", "expected"),
     [

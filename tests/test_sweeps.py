@@ -9,11 +9,11 @@ import zoo
 from structure import assert_valid, faces_of
 
 from remeshvec import Adaptive, remesh
-from remeshvec._types import DEAD
+from remeshvec.core.vocabulary import DEAD
 from remeshvec.operations import split
-from remeshvec.operations.measure import measure_edges
+from remeshvec.operations.classify import classify_edges
 
-sweeps = sys.modules["remeshvec.sweeps"]
+sweeps = sys.modules["remeshvec.sweeps.sweeps"]
 
 
 class Spy:
@@ -61,11 +61,11 @@ def called(name, varies=False, adaptive=False, **more):
 @pytest.mark.parametrize("name", [name for name in CASES if name != "deviation"])
 def test_collapses_are_told_the_truth(name, sizes, per_block, monkeypatch):
     """Flags that the last round of splits left are what would be measured then; the mesh is whole."""
-    monkeypatch.setattr("remeshvec.edge_sets.FACES_PER_BLOCK", per_block)
+    monkeypatch.setattr("remeshvec.mesh.blocks.FACES_PER_BLOCK", per_block)
 
     def look(mesh, blocks, limits, parallel, flags):
         assert_valid(mesh, slits=name == "seams")
-        fresh = measure_edges(mesh, blocks, flags.longest, limits.shortest, False)
+        fresh = classify_edges(mesh, blocks, flags.longest, limits.shortest, False)
         assert flags.shortest == limits.shortest
         assert np.array_equal(flags.mask, fresh.mask)
         assert fresh.n_long == 0
@@ -80,7 +80,7 @@ def test_where_rounds_run_out_edges_are_measured_again(monkeypatch):
     monkeypatch.setattr(sweeps, "MAX_ROUNDS", 1)
 
     def look(mesh, blocks, limits, parallel, flags):
-        fresh = measure_edges(mesh, blocks, flags.longest, limits.shortest, False)
+        fresh = classify_edges(mesh, blocks, flags.longest, limits.shortest, False)
         assert np.array_equal(flags.mask, fresh.mask)
         return fresh.n_long
 
@@ -106,7 +106,7 @@ def test_holes_are_closed(name, monkeypatch):
 def test_a_guarded_sweep_keeps_its_numbers(monkeypatch):
     """The mesh that was remembered, its trials and what is held have the same vertices."""
     seen = []
-    guard = sys.modules["remeshvec.deviation"].DeviationGuard
+    guard = sys.modules["remeshvec.sweeps.sweeps.deviation"].DeviationGuard
     for name in ("remember", "offenders", "hold"):
         method = getattr(guard, name)
 

@@ -14,7 +14,9 @@ import pytest
 import strict
 import zoo
 
-from remeshvec import _jit, _threads, remesh
+from remeshvec import remesh
+from remeshvec.core import compiler as _jit
+from remeshvec.core import threads as _threads
 
 ROOT = Path(__file__).resolve().parents[1]
 CORES = 4  # as the tests have it, whatever the machine says
@@ -37,8 +39,8 @@ def pool(monkeypatch):
 @pytest.fixture
 def all_parallel(monkeypatch, pool):
     """Let small meshes have many blocks, and share them."""
-    monkeypatch.setattr("remeshvec.edge_sets.FACES_PER_BLOCK", 200)
-    monkeypatch.setattr("remeshvec.sweeps._PARALLEL_FACES", 0)
+    monkeypatch.setattr("remeshvec.mesh.blocks.FACES_PER_BLOCK", 200)
+    monkeypatch.setattr("remeshvec.sweeps.sweeps._PARALLEL_FACES", 0)
     return pool
 
 
@@ -133,7 +135,7 @@ def spans(shared, run, args):
 
 
 def test_eight_calls_at_once_give_the_same_bits(monkeypatch, all_parallel):
-    monkeypatch.setattr("remeshvec.sweeps._PARALLEL_FACES", 2000)
+    monkeypatch.setattr("remeshvec.sweeps.sweeps._PARALLEL_FACES", 2000)
     meshes = [zoo.torus(48, 24), zoo.torus(24, 12), zoo.upsampled(*zoo.genus_2(), n=2, noise=0.2)]
     cases = list(itertools.product(meshes, ("fast", "default")))
     cases = (cases * 2)[:8]

@@ -9,7 +9,7 @@ import textured
 import zoo
 
 from remeshvec import OptionError, remesh
-from remeshvec.transfer import interpolate
+from remeshvec.output.transfer import interpolate
 
 RNG = np.random.default_rng(5)
 LINEAR = RNG.normal(size=(3, 4))

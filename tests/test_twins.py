@@ -9,19 +9,20 @@ import topology
 import zoo
 from pieces import on_threads, shuffled
 
-from remeshvec._types import CURVE, INNER, NONE
-from remeshvec.twins import PINCHED, following, match_half_edges, previous
+from remeshvec.core.vocabulary import CURVE, INNER, NONE
+from remeshvec.mesh.twins import PINCHED, match_halfedges
+from remeshvec.mesh.walk import next_halfedge, previous_halfedge
 
 
 def matched(F, n, by_winding=True):
     """Match on one thread, on three, and with the pieces in some other order: the same each time."""
     origin = np.ascontiguousarray(F, np.int32).reshape(-1)
     before = origin.copy()
-    one = match_half_edges(origin, n, False, by_winding)
+    one = match_halfedges(origin, n, False, by_winding)
     with on_threads(3):
-        others = [match_half_edges(origin, n, True, by_winding)]
+        others = [match_halfedges(origin, n, True, by_winding)]
     with on_threads(3), shuffled():
-        others.append(match_half_edges(origin, n, True, by_winding))
+        others.append(match_halfedges(origin, n, True, by_winding))
     assert np.array_equal(origin, before)
     whole = [k for k in range(n) if one.kind[k] != PINCHED]
     for other in others:
@@ -67,7 +68,10 @@ def naive_fans(F, twin):
                 continue
             seen.add(h)
             fan.append(h)
-            for g in (twin[previous(h)], following(twin[h]) if twin[h] != NONE else NONE):
+            for g in (
+                twin[previous_halfedge(h)],
+                next_halfedge(twin[h]) if twin[h] != NONE else NONE,
+            ):
                 if g != NONE:
                     rest.append(int(g))
         fans[int(np.reshape(F, -1)[first])].append(sorted(fan))
@@ -135,7 +139,7 @@ def test_pairs_of_any_winding(seed):
 
 def test_more_threads_than_faces():
     with on_threads(8):
-        result = match_half_edges(np.array([0, 1, 2], np.int32), 3, True)
+        result = match_halfedges(np.array([0, 1, 2], np.int32), 3, True)
     assert result.twin.tolist() == [NONE] * 3 and result.kind.tolist() == [CURVE] * 3
 
 
@@ -146,8 +150,8 @@ def test_a_hub_of_any_size_takes_linear_time(first):
     F = ((F + first) % 150_002).astype(np.int32).reshape(-1)
     rim = np.arange(100_000) + 2
     book = np.column_stack([0 * rim, 0 * rim + 1, rim]).astype(np.int32).reshape(-1)
-    match_half_edges(F[:30], 150_002, False)  # compiled before the clock starts
+    match_halfedges(F[:30], 150_002, False)  # compiled before the clock starts
     start = time.perf_counter()
-    assert (match_half_edges(F, 150_002, False).kind == INNER).all()
-    assert match_half_edges(book, 100_002, False).found.non_manifold_edges == 1
+    assert (match_halfedges(F, 150_002, False).kind == INNER).all()
+    assert match_halfedges(book, 100_002, False).found.non_manifold_edges == 1
     assert time.perf_counter() - start < 5.0  # about 0.03 s; quadratic time would be minutes

@@ -6,7 +6,7 @@ import pytest
 import zoo
 from structure import assert_valid, blocks_of, built, copied, featured, one_block
 
-from remeshvec._types import CURVE, FIXED, HELD, INNER
+from remeshvec.core.vocabulary import CURVE, FIXED, HELD, INNER
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.unfold import undo_folds
 

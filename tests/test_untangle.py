@@ -18,7 +18,7 @@ from structure import (
     referenced,
 )
 
-from remeshvec._types import FIXED, INNER
+from remeshvec.core.vocabulary import FIXED, INNER
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.untangle import approach_vertices, untangle_vertices
 

@@ -117,7 +117,7 @@ def test_absence_of_pyvista_is_named(tmp_path, monkeypatch):
 
 
 def test_the_command_names_the_absence_before_the_work(tmp_path, monkeypatch, capsys):
-    from remeshvec.cli import main
+    from remeshvec.cli.command import main
 
     monkeypatch.setitem(sys.modules, "pyvista", None)
     for flag in (["--picture", str(tmp_path / "a.png")], ["--visualize"]):
@@ -157,8 +157,8 @@ def _Recorded(pyvista, shown, **options):
 
 
 def test_the_command_makes_a_picture(pyvista, tmp_path, monkeypatch, capsys):
-    from remeshvec.cli import main
-    from remeshvec.mesh_files import write_mesh
+    from remeshvec.cli.command import main
+    from remeshvec.files.plain import write_mesh
 
     monkeypatch.chdir(tmp_path)
     write_mesh("in.obj", *box((1, 1, 1)))

@@ -62,7 +62,7 @@ def in_plain_python(*arguments):
 
 
 def test_whole_calls_agree_with_the_jit(monkeypatch):
-    monkeypatch.setattr("remeshvec.edge_sets.FACES_PER_BLOCK", 20)
+    monkeypatch.setattr("remeshvec.mesh.blocks.FACES_PER_BLOCK", 20)
     done = in_plain_python("-c", SCRIPT, json.dumps(CASES))
     assert done.returncode == 0, done.stderr[-3000:]
     found = json.loads(done.stdout)

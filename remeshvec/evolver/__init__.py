@@ -21,3 +21,7 @@ __all__ = [
     "write_fe",
     "write_frames",
 ]
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .._types import FloatArray
+from ..core.vocabulary import FloatArray
 
 __all__ = ["Potential", "areas", "gradients", "hessian", "potentials", "volumes"]
 

@@ -11,12 +11,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .._check import positive_count, positive_number
-from .._types import FloatArray
-from ..clean import count_edges
+from ..core.check import positive_count, positive_number
+from ..core.vocabulary import FloatArray
 from ..errors import OptionError
-from ..mesh_files import write_mesh
-from ..remesh import remesh
+from ..files.plain import write_mesh
+from ..mesh.repair import count_edges
+from ..pipeline.remesh import remesh
 from .energies import areas
 from .minimize import Minimum, minimize, restore_volumes
 from .necks import cut_necks as cut
@@ -30,7 +30,7 @@ Backend = Callable[..., Minimum]
 _FLOW_STEPS = 4
 
 # Sine of the smallest angle below which triangles have to be replaced before the flow goes on.
-_SLIVER = 0.2
+_THIN_FACE = 0.2
 
 # So many sweeps in a row that lower the energy by less, relative to it, are the last ones of a length;
 # unless forces grow, as they do for long where a surface is about to break.
@@ -336,7 +336,7 @@ def _is_fit(_: int, problem: CapillaryProblem, *__: float) -> bool:
     area = areas(T)
     # Twice the area over the two longer sides is the sine of the smallest angle.
     sine = 2.0 * area / np.sqrt(np.maximum(squared[:, 1] * squared[:, 2], np.finfo(float).tiny))
-    return bool(sine.min() > _SLIVER)
+    return bool(sine.min() > _THIN_FACE)
 
 
 def _graded(problem: CapillaryProblem, L: float) -> float | FloatArray:

@@ -15,10 +15,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from .._check import positive_count, positive_number
-from .._types import FloatArray
+from ..core.check import positive_count, positive_number
+from ..core.vocabulary import FloatArray
 from ..errors import OptionError
-from ..solver import LaplacianSolver
+from ..modelling.solver import LaplacianSolver
 from .problem import CapillaryProblem, Forces
 
 __all__ = ["Minimum", "measured", "minimize", "restore_volumes"]

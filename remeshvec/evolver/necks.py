@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from .._types import FloatArray
+from ..core.vocabulary import FloatArray
 from .energies import areas
 
 __all__ = ["Cut", "cut_necks"]
@@ -24,7 +24,7 @@ Cycle = tuple[int, ...]
 
 # A piece counts as hanging on a neck if its area is so many times that of the cap. Less is the base of a
 # cone, or a vertex with three faces.
-_PIECE = 8.0
+_SHORTEST_PIECE = 8.0
 
 
 class Cut(NamedTuple):
@@ -117,7 +117,7 @@ def _is_neck(V: FloatArray, F: IntArray, cycle: Cycle) -> bool:
         if seeds is None:
             return False
         reached = _reached(F, seeds, cycle)
-        if area[reached].sum() < _PIECE * cap or reached.sum() < 8:
+        if area[reached].sum() < _SHORTEST_PIECE * cap or reached.sum() < 8:
             return False
     return True
 

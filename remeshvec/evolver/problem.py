@@ -11,10 +11,10 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
 
-from .._check import as_array, as_indices, as_mask, as_mesh, positive_number, which
-from .._types import FloatArray
-from ..clean import count_edges
+from ..core.check import as_array, as_indices, as_mask, as_mesh, positive_number, which
+from ..core.vocabulary import FloatArray
 from ..errors import MeshInputError, OptionError
+from ..mesh.repair import count_edges
 from .energies import areas, gradients, hessian, potentials, volumes
 
 __all__ = ["CapillaryProblem", "Forces"]

@@ -18,8 +18,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .._check import positive_number
-from .._types import FloatArray
+from ..core.check import positive_number
+from ..core.vocabulary import FloatArray
 from ..errors import MeshFormatError, OptionError
 from .errors import EvolverError
 from .minimize import Minimum, measured, restore_volumes
@@ -53,7 +53,7 @@ def write_fe(path: str | Path, problem: CapillaryProblem) -> Path:
     """
     if problem.density and np.any(problem.gravity[:2]):
         raise OptionError("Surface Evolver knows gravity along z only; turn the problem")
-    edges, of_face = _edges(problem.F)
+    edges, of_face = _numbered_edges(problem.F)
     wires = {tuple(edge) for edge in np.sort(problem.fixed_edges, axis=1).tolist()}
     gravity = -float(problem.gravity[2]) if problem.density else 0.0
     lines = ["symmetric_content", f"gravity_constant {gravity!r}", "", "vertices"]
@@ -85,7 +85,7 @@ def _bodies(problem: CapillaryProblem) -> list[str]:
     return [*lines, ""]
 
 
-def _edges(F: IntArray) -> tuple[IntArray, IntArray]:
+def _numbered_edges(F: IntArray) -> tuple[IntArray, IntArray]:
     """Edges (k, 2), and of every face the numbers of its three, from 1, negative where it runs back."""
     half = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
     edges, number = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
@@ -127,7 +127,7 @@ def read_dump(path: str | Path) -> tuple[FloatArray, IntArray, NDArray[np.bool_]
                 e = int(word)
                 start.append(number[edges[abs(e)][0 if e > 0 else 1]])
             F.append(start)
-            if len(set(start)) < 3 or _is_number(faces[k][3:4]):
+            if len(set(start)) < 3 or _is_plain_number(faces[k][3:4]):
                 raise MeshFormatError(f"{path}: face {k} is no triangle")
     except (KeyError, IndexError, ValueError) as error:
         if isinstance(error, MeshFormatError):
@@ -143,7 +143,7 @@ def _records(section: str) -> dict[int, list[str]]:
     return {int(row[0]): row[1:] for row in rows if row and row[0].isdigit()}
 
 
-def _is_number(words: list[str]) -> bool:
+def _is_plain_number(words: list[str]) -> bool:
     return bool(words) and re.fullmatch(r"[-+]?\d+", words[0]) is not None
 
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._jit import inlined, threaded
-from .._types import CURVE, DEAD, FIXED, HELD, INNER, NONE, SEAM, Blocks, Mesh
-from ..edge_sets import face_range, list_range, per_stage_block, stages, vertex_range
-from ..halfedge import following, previous
-from .measure import REMOVED, EdgeFlags, edge_flags
+from ..core.compiler import inlined, threaded
+from ..core.vocabulary import CURVE, DEAD, FIXED, HELD, INNER, NON_MANIFOLD, NONE, Blocks, Mesh
+from ..mesh.blocks import face_range, list_range, per_stage_block, stages, vertex_range
+from ..mesh.walk import next_halfedge, previous_halfedge
+from .classify import REMOVED, EdgeFlags, edge_flags
 
 __all__ = ["birth_between", "bisect_edges"]
 
@@ -79,14 +79,14 @@ def _next_dead(array, stride, start, end):
 def _is_owned(mesh, h, low, high):
     """Tell whether all corners of the faces beside an edge lie in a range."""
     a = mesh.origin[h]
-    b = mesh.origin[following(h)]
-    c = mesh.origin[previous(h)]
+    b = mesh.origin[next_halfedge(h)]
+    c = mesh.origin[previous_halfedge(h)]
     if min(a, b, c) < low or max(a, b, c) >= high:
         return False
     t = np.int64(mesh.twin[h])
     if t == NONE:
         return True
-    d = mesh.origin[previous(t)]
+    d = mesh.origin[previous_halfedge(t)]
     return low <= d < high
 
 
@@ -99,7 +99,7 @@ def _split_edge(mesh, h, v, f, g, half_longest, twice_shortest, mask):
     h = max(h, np.int64(mesh.twin[h]))  # as in `split`, the later half-edge gives the birth
     t = np.int64(mesh.twin[h])
     a = np.int64(mesh.origin[h])
-    b = np.int64(mesh.origin[following(h)])
+    b = np.int64(mesh.origin[next_halfedge(h)])
     mesh.birth[v] = birth_between(mesh, h, a, b)
     mesh.kind[v] = INNER if mesh.curve[h] == NONE else CURVE
     for i in range(4):
@@ -126,9 +126,9 @@ def _split_edge(mesh, h, v, f, g, half_longest, twice_shortest, mask):
 @inlined
 def _halve_face(mesh, h, v, f):
     """Face a b c of ``h`` becomes a v c, and face ``f`` v b c; twins across the edge are left open."""
-    n = following(h)
+    n = next_halfedge(h)
     b = np.int64(mesh.origin[n])
-    c = mesh.origin[previous(h)]
+    c = mesh.origin[previous_halfedge(h)]
     mesh.origin[n] = v
     mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2] = v, b, c
     mesh.curve[3 * f] = mesh.curve[h]
@@ -163,4 +163,4 @@ def birth_between(mesh, h, v, w):
     slides_w = CURVE <= mesh.kind[w] < FIXED
     if slides_v:
         return min(mesh.birth[v], mesh.birth[w]) if slides_w else mesh.birth[v]
-    return mesh.birth[w] if slides_w else np.int32(c & (SEAM - 1))
+    return mesh.birth[w] if slides_w else np.int32(c & (NON_MANIFOLD - 1))

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import inlined, threaded
-from .._types import CURVE, DEAD, FROZEN, INNER, NONE, SEAM, Blocks, Mesh
-from ..edge_sets import DONE, list_range, per_block, per_stage_block, stages, vertex_range
-from ..geometry import distance_squared
-from ..halfedge import following, previous
+from ..core.compiler import inlined, threaded
+from ..core.geometry import distance_squared
+from ..core.vocabulary import CURVE, DEAD, FROZEN, INNER, NON_MANIFOLD, NONE, Blocks, Mesh
+from ..mesh.blocks import DONE, list_range, per_block, per_stage_block, stages, vertex_range
+from ..mesh.walk import next_halfedge, previous_halfedge
+from .classify import REMOVED, EdgeFlags, classify_edges, is_short
 from .guards import folds_over, keeps_curves, keeps_link, makes_sliver, overshoots
-from .measure import REMOVED, EdgeFlags, is_short, measure_edges
 from .rings import (
     COLLAPSED,
     GONE,
@@ -72,10 +72,10 @@ def collapse_short_edges(
 ) -> np.ndarray:
     """Collapse the short edges but for those with siblings; returns counts by outcome.
 
-    ``flags`` are what `measure_edges` says of this mesh and these limits, where that is known.
+    ``flags`` are what `classify_edges` says of this mesh and these limits, where that is known.
     """
     if flags is None:
-        flags = measure_edges(mesh, blocks, np.inf, limits.shortest, parallel)
+        flags = classify_edges(mesh, blocks, np.inf, limits.shortest, parallel)
     candidates = np.empty(mesh.origin.size, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
     _list_short_edges(parallel, mesh, blocks, flags.mask, candidates, count)
@@ -132,7 +132,7 @@ def _collapse(span, mesh, blocks, stage, limits, candidates, count, tally):
 def _collapse_edge(mesh, h, low, high, limits, rings):
     """Collapse one edge if every guard agrees; returns the outcome."""
     c = mesh.curve[h]
-    if c >= SEAM:
+    if c >= NON_MANIFOLD:
         return KEPT_CURVE
     outcome, x, y, z, s, n_a, n_b = examine_edge(mesh, h, low, high, limits, rings)
     if outcome == COLLAPSED:
@@ -148,7 +148,7 @@ def examine_edge(mesh, h, low, high, limits, rings):
     """
     X = mesh.X
     a = np.int64(mesh.origin[h])
-    b = np.int64(mesh.origin[following(h)])
+    b = np.int64(mesh.origin[next_halfedge(h)])
     if b < low or b >= high:
         return OUTSIDE, 0.0, 0.0, 0.0, 0.0, 0, 0
     length = distance_squared(X, a, b)
@@ -193,10 +193,10 @@ def _overshoots_ahead(mesh, h, x, y, z, s, low, high, half_factor):
         g = np.int64(mesh.twin[h]) if side else h
         for _ in range(3):
             if g != NONE:
-                g = np.int64(mesh.twin[previous(g)])
+                g = np.int64(mesh.twin[previous_halfedge(g)])
         if g == NONE:
             continue
-        w = mesh.origin[following(g)]
+        w = mesh.origin[next_halfedge(g)]
         if w < low or w >= high:
             continue
         dx, dy, dz = X[w, 0] - x, X[w, 1] - y, X[w, 2] - z
@@ -280,11 +280,11 @@ def remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b):
     """Close the edge's one or two faces and give the other faces of the removed end to the survivor."""
     twin = mesh.twin
     a = np.int64(mesh.origin[h])
-    b = np.int64(mesh.origin[following(h)])
+    b = np.int64(mesh.origin[next_halfedge(h)])
     t = np.int64(twin[h])
-    n = following(h)
+    n = next_halfedge(h)
     tn = np.int64(twin[n])
-    tp = np.int64(twin[previous(h)])
+    tp = np.int64(twin[previous_halfedge(h)])
     survivor, removed, side, count = a, b, 1, n_b
     if mesh.kind[b] > mesh.kind[a]:
         survivor, removed, side, count = b, a, 0, n_a
@@ -295,13 +295,13 @@ def remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b):
     inner = twin[start] != NONE
     if inner or start == n:
         start = tp
-    elif t != NONE and start == following(t):
-        start = np.int64(twin[previous(t)])
+    elif t != NONE and start == next_halfedge(t):
+        start = np.int64(twin[previous_halfedge(t)])
     excess = mesh.valence_excess[a] + mesh.valence_excess[b] + (1 if t == NONE else 2)
 
     _close_face(mesh, h, tn, tp)
     if t != NONE:
-        _close_face(mesh, t, np.int64(twin[following(t)]), np.int64(twin[previous(t)]))
+        _close_face(mesh, t, np.int64(twin[next_halfedge(t)]), np.int64(twin[previous_halfedge(t)]))
     for i in range(count):
         if mesh.origin[faces[side, i]] != DEAD:
             mesh.origin[faces[side, i]] = survivor
@@ -319,11 +319,11 @@ def remove_edge(mesh, h, x, y, z, s, faces, n_a, n_b):
 @inlined
 def _close_face(mesh, h, tn, tp):
     """Remove the face of ``h`` and join the twins of its other two edges; at most one is on a curve."""
-    p = previous(h)
+    p = previous_halfedge(h)
     apex = mesh.origin[p]
-    curve = max(mesh.curve[following(h)], mesh.curve[p])
-    if min(mesh.curve[following(h)], mesh.curve[p]) <= FROZEN:
-        curve = min(mesh.curve[following(h)], mesh.curve[p])
+    curve = max(mesh.curve[next_halfedge(h)], mesh.curve[p])
+    if min(mesh.curve[next_halfedge(h)], mesh.curve[p]) <= FROZEN:
+        curve = min(mesh.curve[next_halfedge(h)], mesh.curve[p])
     if tn != NONE:
         mesh.twin[tn] = tp
         mesh.curve[tn] = curve

@@ -11,16 +11,16 @@ from math import sqrt
 
 import numpy as np
 
-from .._jit import threaded
-from .._types import DEAD, HELD, INNER, MAX_VALENCE, NONE, Blocks, Mesh, Tree
-from ..bvh import STACK, closest_face, point_on_face
-from ..edge_sets import per_block
-from ..geometry import face_vector
-from ..halfedge import previous
+from ..core.compiler import threaded
+from ..core.geometry import face_vector
+from ..core.vocabulary import DEAD, HELD, INNER, MAX_VALENCE, NONE, Blocks, Mesh, Tree
+from ..mesh.blocks import per_block
+from ..mesh.walk import previous_halfedge
+from ..reference.bvh import STACK, closest_face, point_on_face
 
 __all__ = ["fit_vertices"]
 
-_SHARE = 0.5
+_FIT_SHARE = 0.5
 
 
 def fit_vertices(mesh: Mesh, blocks: Blocks, tree: Tree, reach: float, parallel: bool) -> None:
@@ -75,13 +75,13 @@ def _shift(span, mesh, blocks, gaps, reach, X):
                 nz += gaps[f, 2]
                 gap += gaps[f, 3]
                 weight += sqrt(gaps[f, 0] ** 2 + gaps[f, 1] ** 2 + gaps[f, 2] ** 2)
-                h = np.int64(mesh.twin[previous(h)])
+                h = np.int64(mesh.twin[previous_halfedge(h)])
                 if h == start or h == NONE:
                     break
             norm = sqrt(nx * nx + ny * ny + nz * nz)
             if norm > 0.0:
                 limit = reach * X[v, 3]
-                step = max(-limit, min(limit, _SHARE * gap / weight)) / norm
+                step = max(-limit, min(limit, _FIT_SHARE * gap / weight)) / norm
                 X[v, 0] += step * nx
                 X[v, 1] += step * ny
                 X[v, 2] += step * nz

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import inlined, threaded
-from .._types import CURVE, DEAD, MAX_VALENCE, NONE, Blocks, Mesh
-from ..edge_sets import DONE, list_range, per_block, per_stage_block, stages, vertex_range
-from ..geometry import distance_squared, face_vector, is_flat, mean_ratio, turn_exceeds
-from ..halfedge import following, previous
+from ..core.compiler import inlined, threaded
+from ..core.geometry import distance_squared, face_vector, is_flat, mean_ratio, turn_exceeds
+from ..core.vocabulary import CURVE, DEAD, MAX_VALENCE, NONE, Blocks, Mesh
+from ..mesh.blocks import DONE, list_range, per_block, per_stage_block, stages, vertex_range
+from ..mesh.walk import next_halfedge, previous_halfedge
 
 __all__ = ["FlipLimits", "flip_edges"]
 
@@ -152,14 +152,14 @@ def _flip(span, mesh, blocks, stage, limits, candidates, count, touched, tally):
 @inlined
 def _flip_edge(mesh, h, low, high, limits, touched):
     """Flip one edge if it is still worth it and every guard agrees; returns the outcome."""
-    b = mesh.origin[following(h)]
-    c = mesh.origin[previous(h)]
+    b = mesh.origin[next_halfedge(h)]
+    c = mesh.origin[previous_halfedge(h)]
     if b < low or b >= high or c < low or c >= high:
         return OUTSIDE
     t = np.int64(mesh.twin[h])
     if t == NONE:
         return GONE
-    d = mesh.origin[previous(t)]
+    d = mesh.origin[previous_halfedge(t)]
     if d < low or d >= high:
         return OUTSIDE
     if not _is_wanted(mesh, h, t, limits.delaunay_ties):
@@ -184,8 +184,8 @@ def valence_gain(mesh, h, t):
     excess = mesh.valence_excess
     a = excess[mesh.origin[h]]
     b = excess[mesh.origin[t]]
-    c = excess[mesh.origin[previous(h)]]
-    d = excess[mesh.origin[previous(t)]]
+    c = excess[mesh.origin[previous_halfedge(h)]]
+    d = excess[mesh.origin[previous_halfedge(t)]]
     # Each of the four comes one nearer to its ideal, or one farther away.
     nearer = np.int64(a > 0) + np.int64(b > 0) + np.int64(c < 0) + np.int64(d < 0)
     gain = 2 * nearer - 4
@@ -207,8 +207,8 @@ def _dot_opposite(mesh, h):
     """Scalar product of the two edges that meet opposite a half-edge."""
     X = mesh.X
     a = mesh.origin[h]
-    b = mesh.origin[following(h)]
-    c = mesh.origin[previous(h)]
+    b = mesh.origin[next_halfedge(h)]
+    c = mesh.origin[previous_halfedge(h)]
     return (
         (X[a, 0] - X[c, 0]) * (X[b, 0] - X[c, 0])
         + (X[a, 1] - X[c, 1]) * (X[b, 1] - X[c, 1])
@@ -221,8 +221,8 @@ def _cotangent(mesh, h, dot):
     """Cotangent of the angle opposite a half-edge; far below zero for a face without area."""
     X = mesh.X
     a = mesh.origin[h]
-    b = mesh.origin[following(h)]
-    c = mesh.origin[previous(h)]
+    b = mesh.origin[next_halfedge(h)]
+    c = mesh.origin[previous_halfedge(h)]
     nx, ny, nz = face_vector(
         X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
     )
@@ -240,9 +240,9 @@ def duplicates_edge(mesh, c, d):
     start = np.int64(mesh.vertex_halfedge[c])
     h = start
     for _ in range(MAX_VALENCE):
-        if mesh.origin[following(h)] == d:
+        if mesh.origin[next_halfedge(h)] == d:
             return True
-        p = previous(h)
+        p = previous_halfedge(h)
         h = np.int64(mesh.twin[p])
         if h == NONE:
             return mesh.origin[p] == d
@@ -261,8 +261,8 @@ def bends_quad(mesh, h, t, cosine):
     X = mesh.X
     a = mesh.origin[h]
     b = mesh.origin[t]
-    c = mesh.origin[previous(h)]
-    d = mesh.origin[previous(t)]
+    c = mesh.origin[previous_halfedge(h)]
+    d = mesh.origin[previous_halfedge(t)]
     ux, uy, uz = face_vector(
         X[a, 0], X[a, 1], X[a, 2], X[d, 0], X[d, 1], X[d, 2], X[c, 0], X[c, 1], X[c, 2]
     )
@@ -287,14 +287,14 @@ def makes_sliver(mesh, h, t):
     """Guard (optional): the worse of the two triangles would get worse."""
     a = mesh.origin[h]
     b = mesh.origin[t]
-    c = mesh.origin[previous(h)]
-    d = mesh.origin[previous(t)]
-    before = min(_shape(mesh.X, a, b, c), _shape(mesh.X, b, a, d))
-    return min(_shape(mesh.X, a, d, c), _shape(mesh.X, b, c, d)) < before
+    c = mesh.origin[previous_halfedge(h)]
+    d = mesh.origin[previous_halfedge(t)]
+    before = min(_flip_shape(mesh.X, a, b, c), _flip_shape(mesh.X, b, a, d))
+    return min(_flip_shape(mesh.X, a, d, c), _flip_shape(mesh.X, b, c, d)) < before
 
 
 @inlined
-def _shape(X, a, b, c):
+def _flip_shape(X, a, b, c):
     nx, ny, nz = face_vector(
         X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
     )
@@ -314,12 +314,12 @@ def _turn_edge(mesh, h, t):
     """
     origin = mesh.origin
     twin = mesh.twin
-    hn = following(h)
-    tn = following(t)
+    hn = next_halfedge(h)
+    tn = next_halfedge(t)
     a = np.int64(origin[h])
     b = np.int64(origin[t])
-    c = np.int64(origin[previous(h)])
-    d = np.int64(origin[previous(t)])
+    c = np.int64(origin[previous_halfedge(h)])
+    d = np.int64(origin[previous_halfedge(t)])
     bc = np.int64(twin[hn])
     ad = np.int64(twin[tn])
     twin[h] = ad

@@ -10,10 +10,10 @@ from math import sqrt
 
 import numpy as np
 
-from .._jit import inlined
-from .._types import CURVE, INNER, NONE
-from ..geometry import distance_squared, face_vector, is_flat, mean_ratio, turn_exceeds
-from ..halfedge import following, previous
+from ..core.compiler import inlined
+from ..core.geometry import distance_squared, face_vector, is_flat, mean_ratio, turn_exceeds
+from ..core.vocabulary import CURVE, INNER, NONE
+from ..mesh.walk import next_halfedge, previous_halfedge
 
 __all__ = ["folds_over", "joins_curves", "keeps_curves", "keeps_link", "makes_sliver", "overshoots"]
 
@@ -33,13 +33,15 @@ def keeps_curves(mesh, h, a, b):
     t = np.int64(mesh.twin[h])
     if joins_curves(mesh, h) or (t != NONE and joins_curves(mesh, t)):
         return False
-    return t != NONE or (mesh.twin[following(h)] != NONE or mesh.twin[previous(h)] != NONE)
+    return t != NONE or (
+        mesh.twin[next_halfedge(h)] != NONE or mesh.twin[previous_halfedge(h)] != NONE
+    )
 
 
 @inlined
 def joins_curves(mesh, h):
     """Tell whether both other edges of a face are on curves."""
-    return mesh.curve[following(h)] != NONE and mesh.curve[previous(h)] != NONE
+    return mesh.curve[next_halfedge(h)] != NONE and mesh.curve[previous_halfedge(h)] != NONE
 
 
 @inlined
@@ -124,17 +126,17 @@ def makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
         for i in range(n_a if side == 0 else n_b):
             h = faces[side, i]
             u = mesh.origin[h]
-            v = mesh.origin[following(h)]
-            w = mesh.origin[previous(h)]
+            v = mesh.origin[next_halfedge(h)]
+            w = mesh.origin[previous_halfedge(h)]
             opposite = distance_squared(X, v, w)
-            before = min(before, _shape(X, X[u, 0], X[u, 1], X[u, 2], v, w, opposite))
+            before = min(before, _worst_shape(X, X[u, 0], X[u, 1], X[u, 2], v, w, opposite))
             if v != other and w != other:
-                after = min(after, _shape(X, x, y, z, v, w, opposite))
+                after = min(after, _worst_shape(X, x, y, z, v, w, opposite))
     return after < before
 
 
 @inlined
-def _shape(X, x, y, z, v, w, opposite):
+def _worst_shape(X, x, y, z, v, w, opposite):
     nx, ny, nz = face_vector(x, y, z, X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2])
     lv = (X[v, 0] - x) ** 2 + (X[v, 1] - y) ** 2 + (X[v, 2] - z) ** 2
     lw = (X[w, 0] - x) ** 2 + (X[w, 1] - y) ** 2 + (X[w, 2] - z) ** 2

@@ -7,12 +7,11 @@ not shrink and a crease stays sharp; fixed vertices stay.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from .._jit import inlined, threaded
-from .._types import (
+from ..core.compiler import inlined, threaded
+from ..core.geometry import face_vector
+from ..core.vocabulary import (
     CURVE,
     DEAD,
     FIXED,
@@ -21,38 +20,20 @@ from .._types import (
     NONE,
     Blocks,
     FloatArray,
-    IndexArray,
     Mesh,
-    Tree,
 )
-from ..bvh import STACK, Surface, point_on_face, search_face, walk_to_face
-from ..edge_sets import per_block
-from ..geometry import face_vector
-from ..halfedge import following, previous
-from ..polyline import closest_on_curve
+from ..features.polyline import closest_on_curve
+from ..mesh.blocks import per_block
+from ..mesh.walk import next_halfedge, previous_halfedge
+from ..reference.bvh import STACK, point_on_face, search_face, walk_to_face
+from ..reference.surface import Reference
 
 __all__ = [
-    "Reference",
     "locate_vertices",
     "project_curves",
     "project_vertices",
     "read_lengths",
 ]
-
-
-class Reference(NamedTuple):
-    """The input surface: what vertices are projected onto and born on."""
-
-    surface: Surface  # gets its tree when it is first projected onto
-    X: FloatArray  # (n, 4), target lengths in the last column
-    origin: IndexArray  # (3 m,)
-    beside: IndexArray  # (2, 3 m), see `polyline.join_edges`
-    arcs: FloatArray  # (3, 3 m), see `polyline.measure_arcs`
-
-    @property
-    def tree(self) -> Tree:
-        """The tree over its faces, built when it is first asked for."""
-        return self.surface.tree
 
 
 def project_vertices(
@@ -72,7 +53,7 @@ def project_vertices(
 
 def project_curves(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
     """Move vertices on curves only: they slide in every sweep, the others drift for some."""
-    if reference.beside.shape[1]:
+    if reference.curve_neighbours.shape[1]:
         _project_curves(parallel, mesh, blocks, *reference[1:4], mesh.X, mesh.birth)
 
 
@@ -142,38 +123,40 @@ def _ring_normal(mesh, X, v):
     start = np.int64(mesh.vertex_halfedge[v])
     h = start
     for _ in range(MAX_VALENCE):
-        b = mesh.origin[following(h)]
-        c = mesh.origin[previous(h)]
+        b = mesh.origin[next_halfedge(h)]
+        c = mesh.origin[previous_halfedge(h)]
         nx, ny, nz = face_vector(
             X[v, 0], X[v, 1], X[v, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
         )
         sx += nx
         sy += ny
         sz += nz
-        h = np.int64(mesh.twin[previous(h)])
+        h = np.int64(mesh.twin[previous_halfedge(h)])
         if h == NONE or h == start:
             break
     return sx, sy, sz
 
 
 @threaded(per_block)
-def _project_curves(span, mesh, blocks, X_in, origin, beside, X, birth):
+def _project_curves(span, mesh, blocks, X_in, origin, curve_neighbours, X, birth):
     for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != CURVE:
                 continue
             h, s, _ = closest_on_curve(
-                X_in, origin, beside, np.int64(birth[v]), X[v, 0], X[v, 1], X[v, 2]
+                X_in, origin, curve_neighbours, np.int64(birth[v]), X[v, 0], X[v, 1], X[v, 2]
             )
             birth[v] = h
             a = origin[h]
-            b = origin[following(h)]
+            b = origin[next_halfedge(h)]
             for i in range(3):
                 X[v, i] = X_in[a, i] + s * (X_in[b, i] - X_in[a, i])
 
 
 @threaded(per_block)
-def _locate(span, mesh, blocks, tree, X_in, origin, beside, trust, near, birth, barycentric):
+def _locate(
+    span, mesh, blocks, tree, X_in, origin, curve_neighbours, trust, near, birth, barycentric
+):
     for k in range(span[0], span[1]):
         stack = np.empty((2, STACK), np.int64)
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
@@ -193,7 +176,7 @@ def _locate(span, mesh, blocks, tree, X_in, origin, beside, trust, near, birth, 
                 barycentric[v, 2] = t
                 continue
             # A fixed vertex lies where its edge starts, and finds itself there.
-            h, s, _ = closest_on_curve(X_in, origin, beside, hint, x, y, z)
+            h, s, _ = closest_on_curve(X_in, origin, curve_neighbours, hint, x, y, z)
             birth[v] = h
             corner = h - 3 * (h // 3)
             barycentric[v, corner] = 1.0 - s

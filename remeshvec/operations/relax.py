@@ -14,10 +14,10 @@ from math import sqrt
 
 import numpy as np
 
-from .._jit import add_four, add_row, inlined, threaded
-from .._types import CURVE, DEAD, INNER, NONE, Blocks, Mesh
-from ..edge_sets import list_range, per_block, per_stage_block, stages, vertex_range
-from ..geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
+from ..core.compiler import add_four, add_row, inlined, threaded
+from ..core.geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
+from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, Mesh
+from ..mesh.blocks import list_range, per_block, per_stage_block, stages, vertex_range
 
 __all__ = ["relax_vertices"]
 
@@ -188,14 +188,14 @@ def _move(span, mesh, blocks, stiffness, sums, X):
     for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] != DEAD and mesh.kind[v] == INNER:
-                dx, dy, dz = _step(X, v, sums, stiffness)
+                dx, dy, dz = _relaxation_step(X, v, sums, stiffness)
                 X[v, 0] += dx
                 X[v, 1] += dy
                 X[v, 2] += dz
 
 
 @inlined
-def _step(X, v, sums, stiffness):
+def _relaxation_step(X, v, sums, stiffness):
     # A vertex on a sharp edge has no tangent plane: it stays, or the rim of a sheet would creep inwards.
     nx, ny, nz = sums[v, 4], sums[v, 5], sums[v, 6]
     norm = sqrt(nx * nx + ny * ny + nz * nz)

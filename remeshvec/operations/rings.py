@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._jit import inlined
-from .._types import INNER, NONE, FloatArray
-from ..geometry import SHARP
-from ..halfedge import following, previous
+from ..core.compiler import inlined
+from ..core.geometry import SHARP
+from ..core.vocabulary import INNER, NONE, FloatArray
+from ..mesh.walk import next_halfedge, previous_halfedge
 
 __all__ = [
     "COLLAPSED",
@@ -84,10 +84,10 @@ def survey_rings(mesh, a, b, x, y, z, s, low, high, half_factor, slack, rings):
         while True:
             at_end = h == NONE
             if at_end:  # the last vertex around a boundary vertex starts no face at it
-                w = np.int64(mesh.origin[previous(rings.face[side, i - 1])])
+                w = np.int64(mesh.origin[previous_halfedge(rings.face[side, i - 1])])
             else:
                 rings.face[side, i] = h
-                w = np.int64(mesh.origin[following(h)])
+                w = np.int64(mesh.origin[next_halfedge(h)])
             if w < low or w >= high:
                 return OUTSIDE
             px, py, pz, length = X[w, 0], X[w, 1], X[w, 2], X[w, 3]
@@ -103,7 +103,7 @@ def survey_rings(mesh, a, b, x, y, z, s, low, high, half_factor, slack, rings):
             i += 1
             if at_end:
                 break
-            h = np.int64(mesh.twin[previous(h)])
+            h = np.int64(mesh.twin[previous_halfedge(h)])
             if h == start:
                 break
             if i == RING_CAPACITY - 1:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._jit import inlined, kernel
-from .._types import DEAD, FIXED, NONE, IndexArray, Mesh
-from ..halfedge import following, previous
+from ..core.compiler import inlined, kernel
+from ..core.vocabulary import DEAD, FIXED, NONE, IndexArray, Mesh
+from ..mesh.walk import next_halfedge, previous_halfedge
 from .collapse import CollapseLimits, examine_edge, remove_edge
 from .rings import COLLAPSED, make_rings
 
@@ -46,7 +46,9 @@ def _collapse_siblings(mesh, members, group, limits, rings):
                 break
             outcome, _, _, _, _, n_a, n_b = examine_edge(mesh, h, 0, end, limits, rings)
             # Where the rings of two siblings meet, on one sheet that meets itself, all stay.
-            if outcome != COLLAPSED or _claim(mesh, rings.face, n_a, n_b, touched, group[g], i):
+            if outcome != COLLAPSED or _claim_rings(
+                mesh, rings.face, n_a, n_b, touched, group[g], i
+            ):
                 agreed = False
                 break
         if not agreed:
@@ -60,7 +62,7 @@ def _collapse_siblings(mesh, members, group, limits, rings):
 
 
 @inlined
-def _claim(mesh, faces, n_a, n_b, touched, first, mine):
+def _claim_rings(mesh, faces, n_a, n_b, touched, first, mine):
     """Mark the vertices around an edge; tells whether a sibling has marked one of them.
 
     Fixed ones do not count: where a seam ends inside a sheet, the rings of both sides hold its tip.
@@ -69,7 +71,7 @@ def _claim(mesh, faces, n_a, n_b, touched, first, mine):
     for side in range(2):
         for i in range(n_a if side == 0 else n_b):
             h = faces[side, i]
-            for g in (h, following(h), previous(h)):
+            for g in (h, next_halfedge(h), previous_halfedge(h)):
                 v = mesh.origin[g]
                 if mesh.kind[v] != FIXED:
                     met |= touched[v] >= first and touched[v] < mine

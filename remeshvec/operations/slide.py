@@ -9,22 +9,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._jit import inlined, threaded
-from .._types import CURVE, DEAD, FIXED, MAX_VALENCE, NONE, Blocks, Mesh
-from ..edge_sets import per_block
-from ..halfedge import following, previous
-from ..polyline import move_on_curve
-from .project import Reference, project_curves
+from ..core.compiler import inlined, threaded
+from ..core.vocabulary import CURVE, DEAD, FIXED, MAX_VALENCE, NONE, Blocks, Mesh
+from ..features.polyline import move_on_curve
+from ..mesh.blocks import per_block
+from ..mesh.walk import next_halfedge, previous_halfedge
+from ..reference.surface import Reference
+from .project import project_curves
 
 __all__ = ["slide_vertices"]
 
 # Share of the way that a vertex goes. Going all of it at once, two neighbours swap their errors for ever.
-SHARE = 0.75
+SLIDE_SHARE = 0.75
 
 
 def slide_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
     """Move all vertices on curves once."""
-    if not reference.beside.shape[1]:
+    if not reference.curve_neighbours.shape[1]:
         return
     project_curves(mesh, blocks, reference, parallel)
     arc = np.zeros(mesh.vertex_halfedge.size)
@@ -41,7 +42,7 @@ def _find_arcs(span, mesh, blocks, X_in, origin, arcs, arc):
                 continue
             h = np.int64(mesh.birth[v])
             a = origin[h]
-            b = origin[following(h)]
+            b = origin[next_halfedge(h)]
             along = 0.0
             length = 0.0
             for i in range(3):
@@ -53,7 +54,7 @@ def _find_arcs(span, mesh, blocks, X_in, origin, arcs, arc):
 
 
 @threaded(per_block)
-def _slide(span, mesh, blocks, X_in, origin, beside, arcs, arc, X, birth):
+def _slide(span, mesh, blocks, X_in, origin, curve_neighbours, arcs, arc, X, birth):
     for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != CURVE:
@@ -62,11 +63,11 @@ def _slide(span, mesh, blocks, X_in, origin, beside, arcs, arc, X, birth):
             if u == NONE:
                 continue
             here = np.int64(birth[v])
-            step = _step(mesh, arc, v, u, w, arcs[2, here])
-            h, s = move_on_curve(beside, arcs, here, arc[v] + SHARE * step)
+            step = _slide_step(mesh, arc, v, u, w, arcs[2, here])
+            h, s = move_on_curve(curve_neighbours, arcs, here, arc[v] + SLIDE_SHARE * step)
             birth[v] = h
             a = origin[h]
-            b = origin[following(h)]
+            b = origin[next_halfedge(h)]
             for i in range(3):
                 X[v, i] = X_in[a, i] + s * (X_in[b, i] - X_in[a, i])
 
@@ -79,8 +80,8 @@ def _neighbours(mesh, v):
     u = w = np.int64(NONE)
     for _ in range(MAX_VALENCE):
         if mesh.curve[h] != NONE:
-            u, w = w, np.int64(mesh.origin[following(h)])
-        p = previous(h)
+            u, w = w, np.int64(mesh.origin[next_halfedge(h)])
+        p = previous_halfedge(h)
         h = np.int64(mesh.twin[p])
         if h == NONE:
             return w, np.int64(mesh.origin[p])
@@ -90,7 +91,7 @@ def _neighbours(mesh, v):
 
 
 @inlined
-def _step(mesh, arc, v, u, w, total):
+def _slide_step(mesh, arc, v, u, w, total):
     """Arc length to the point where the edges to both neighbours are as their target lengths.
 
     The order of the neighbours does not matter. Corners lie at the ends of their curve, on the side

@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._jit import inlined, kernel, threaded
-from .._types import CURVE, DEAD, INNER, NONE, Blocks, IndexArray, Mesh
-from ..edge_sets import per_block
-from ..geometry import distance_squared
+from ..core.compiler import inlined, kernel, threaded
+from ..core.geometry import distance_squared
+from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, IndexArray, Mesh
+from ..mesh.blocks import per_block
 from .bisect import birth_between, bisect_edges
-from .measure import REMOVED, EdgeFlags, measure_edges
+from .classify import REMOVED, EdgeFlags, classify_edges
 from .templates import CORNER, COUNT, GAIN, PART, TWIN
 
-__all__ = ["MAX_ROUNDS", "ROOM", "compact", "split_edges", "split_long_edges"]
+__all__ = ["MAX_ROUNDS", "SPARE", "compact", "split_edges", "split_long_edges"]
 
 # Every round halves the longest edge: 64 rounds divide any float64 length below any other.
 MAX_ROUNDS = 64
@@ -28,7 +28,7 @@ MAX_ROUNDS = 64
 _FEW = 1.0 / 16.0
 
 # Faces and vertices that a new mesh has room for, as a share of its faces: two for every split.
-ROOM = 2.0 * _FEW
+SPARE = 2.0 * _FEW
 
 
 def split_long_edges(
@@ -42,8 +42,8 @@ def split_long_edges(
     """Split every edge longer than ``factor`` times its target length.
 
     Once, by writing the mesh anew; or, where they are few and there is room, in place until none is left.
-    Siblings (see `polyline.find_siblings`) are split together. ``flags`` are what `measure_edges` says of
-    this mesh and factor, where that is known; of a mesh that is split in place they stay true.
+    Siblings (see `polyline.find_siblings`) are split together. ``flags`` are what `classify_edges`
+    says of this mesh and factor, where that is known; of a mesh that is split in place they stay true.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def split_long_edges(
         Edges split.
     """
     if flags is None:
-        flags = measure_edges(mesh, blocks, factor, 0.0, parallel)
+        flags = classify_edges(mesh, blocks, factor, 0.0, parallel)
     n_split = 0
     n_left = flags.n_long
     if siblings is not None:
@@ -62,25 +62,25 @@ def split_long_edges(
         n_split, n_left = bisect_edges(mesh, blocks, flags, parallel)
     if not n_left:
         return mesh, n_split
-    mesh, more = _refine(mesh, blocks, flags.mask, parallel, ROOM)
+    mesh, more = _refine(mesh, blocks, flags.mask, parallel, SPARE)
     return mesh, n_split + more
 
 
 def split_edges(mesh: Mesh, blocks: Blocks, edges: IndexArray, parallel: bool) -> Mesh:
     """Split the given half-edges, whatever their length."""
-    asked = np.zeros(mesh.origin.size // 3, np.uint8)
-    asked[mesh.origin[::3] == DEAD] = REMOVED
-    np.bitwise_or.at(asked, edges // 3, (1 << (edges % 3)).astype(np.uint8))
-    return _refine(mesh, blocks, asked, parallel)[0]
+    requested = np.zeros(mesh.origin.size // 3, np.uint8)
+    requested[mesh.origin[::3] == DEAD] = REMOVED
+    np.bitwise_or.at(requested, edges // 3, (1 << (edges % 3)).astype(np.uint8))
+    return _refine(mesh, blocks, requested, parallel)[0]
 
 
-def _ask_siblings(asked: np.ndarray, members: IndexArray, group: IndexArray) -> None:
+def _ask_siblings(requested: np.ndarray, members: IndexArray, group: IndexArray) -> None:
     """Let all faces around an edge with siblings ask for its split if one does."""
     if len(members):
         bit = (1 << (members % 3)).astype(np.uint8)
-        wanted = np.bitwise_or.reduceat((asked[members // 3] & bit) != 0, group[:-1])
+        wanted = np.bitwise_or.reduceat((requested[members // 3] & bit) != 0, group[:-1])
         wanted = np.repeat(wanted, np.diff(group))
-        np.bitwise_or.at(asked, members[wanted] // 3, bit[wanted])
+        np.bitwise_or.at(requested, members[wanted] // 3, bit[wanted])
 
 
 def compact(mesh: Mesh, blocks: Blocks, parallel: bool, room: float = 0.0) -> Mesh:
@@ -88,15 +88,15 @@ def compact(mesh: Mesh, blocks: Blocks, parallel: bool, room: float = 0.0) -> Me
 
     ``room`` is left free for splits in place, as a share of the faces.
     """
-    asked = np.zeros(mesh.origin.size // 3, np.uint8)
-    asked[mesh.origin[::3] == DEAD] = REMOVED
-    return _refine(mesh, blocks, asked, parallel, room, False)[0]
+    requested = np.zeros(mesh.origin.size // 3, np.uint8)
+    requested[mesh.origin[::3] == DEAD] = REMOVED
+    return _refine(mesh, blocks, requested, parallel, room, False)[0]
 
 
 def _refine(
     mesh: Mesh,
     blocks: Blocks,
-    asked: np.ndarray,
+    requested: np.ndarray,
     parallel: bool,
     room: float = 0.0,
     splits: bool = True,
@@ -106,9 +106,9 @@ def _refine(
     ``room`` is left free at the end of every block, as a share of its faces. ``splits`` says whether
     any edge is asked for.
     """
-    mask = np.empty_like(asked)
+    mask = np.empty_like(requested)
     sizes = np.zeros((len(blocks.face) - 1, 3), np.int64)
-    _mark_edges(parallel, mesh, blocks, asked, splits, mask, sizes)
+    _mark_edges(parallel, mesh, blocks, requested, splits, mask, sizes)
     ends = np.zeros((len(sizes) + 1, 2), np.int64)
     free = (room * sizes[:, 0]).astype(np.int64)
     np.cumsum(sizes[:, 0] + free, out=ends[1:, 0])
@@ -129,9 +129,9 @@ def _refine(
         np.empty(n_vertices, np.uint8),
         np.empty(n_vertices, np.int32),
     )
-    _number(parallel, mesh, blocks, mask, ends, first_child, new_vertex, middle)
+    _number_new(parallel, mesh, blocks, mask, ends, first_child, new_vertex, middle)
     numbers = (mask, first_child, new_vertex, middle)
-    _write(parallel, mesh, blocks, ends, *numbers, *refined)
+    _write_refined(parallel, mesh, blocks, ends, *numbers, *refined)
     if n_split:
         across, count = np.empty(mask.size, np.int32), np.zeros(len(sizes), np.int64)
         changes = (mask, new_vertex, middle, refined.valence_excess, across, count)
@@ -141,7 +141,7 @@ def _refine(
 
 
 @threaded(per_block)
-def _mark_edges(span, mesh, blocks, asked, splits, mask, sizes):
+def _mark_edges(span, mesh, blocks, requested, splits, mask, sizes):
     """Template of every face: mask of the edges that it or a neighbour wants split, and the diagonal.
 
     Bits 4 to 6 say which of the corners' vertices follow this face. Sizes per block: children, vertices
@@ -152,7 +152,7 @@ def _mark_edges(span, mesh, blocks, asked, splits, mask, sizes):
         owned = 0
         split = 0
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            m = np.int64(asked[f])
+            m = np.int64(requested[f])
             if m == REMOVED:
                 mask[f] = REMOVED
                 continue
@@ -163,7 +163,7 @@ def _mark_edges(span, mesh, blocks, asked, splits, mask, sizes):
                     t = np.int64(mesh.twin[h])
                     if t != NONE:
                         g = t // 3
-                        m |= ((np.int64(asked[g]) >> (t - 3 * g)) & 1) << i
+                        m |= ((np.int64(requested[g]) >> (t - 3 * g)) & 1) << i
                     split += ((m >> i) & 1) & (t < h)
                 if m == 3 or m == 5 or m == 6:
                     m = _choose_diagonal(mesh, f, m)
@@ -196,7 +196,7 @@ def _choose_diagonal(mesh, f, m):
 
 
 @threaded(per_block)
-def _number(span, mesh, blocks, mask, ends, first_child, new_vertex, middle):
+def _number_new(span, mesh, blocks, mask, ends, first_child, new_vertex, middle):
     """Give children, vertices and midpoints the order of the half-edges that own them."""
     for k in range(span[0], span[1]):
         child = ends[k, 0]
@@ -221,7 +221,7 @@ def _number(span, mesh, blocks, mask, ends, first_child, new_vertex, middle):
 
 
 @threaded(per_block)
-def _write(
+def _write_refined(
     span, mesh, blocks, ends, mask, first_child, new_vertex, middle,
     origin, twin, curve, source, halfedge, excess, X, kind, birth,
 ):  # fmt: skip

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._jit import threaded
-from .._types import CURVE, DEAD, INNER, Blocks, FloatArray, Mesh
-from ..edge_sets import per_block
-from ..geometry import face_vector, turn_exceeds
+from ..core.compiler import threaded
+from ..core.geometry import face_vector, turn_exceeds
+from ..core.vocabulary import CURVE, DEAD, INNER, Blocks, FloatArray, Mesh
+from ..mesh.blocks import per_block
 
 __all__ = ["undo_folds"]
 

@@ -14,12 +14,12 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from .._jit import inlined, threaded
-from .._types import DEAD, INNER, NONE, Blocks, IndexArray, Mesh, Tree
-from ..bvh import point_on_face, walk_to_face
-from ..edge_sets import DONE, list_range, per_block, per_stage_block, stages, vertex_range
-from ..geometry import distance_squared, face_vector, tangent_basis, turn_exceeds
-from ..halfedge import following, previous
+from ..core.compiler import inlined, threaded
+from ..core.geometry import distance_squared, face_vector, tangent_basis, turn_exceeds
+from ..core.vocabulary import DEAD, INNER, NONE, Blocks, IndexArray, Mesh, Tree
+from ..mesh.blocks import DONE, list_range, per_block, per_stage_block, stages, vertex_range
+from ..mesh.walk import next_halfedge, previous_halfedge
+from ..reference.bvh import point_on_face, walk_to_face
 
 __all__ = ["approach_vertices", "untangle_vertices"]
 
@@ -27,7 +27,7 @@ __all__ = ["approach_vertices", "untangle_vertices"]
 _CAPACITY = 64
 
 # Rounds of 8 trials; the step starts at a tenth of the mean spoke and halves where no trial is better.
-_ROUNDS = 12
+_SEARCH_ROUNDS = 12
 _FIRST_STEP = 0.1
 _LAST_STEP = 0.006
 
@@ -204,13 +204,13 @@ def _copy_ring(origin, twin, vertex_halfedge, X, v, low, high, ring):
     start = np.int64(vertex_halfedge[v])
     h = start
     for i in range(_CAPACITY):
-        w = origin[following(h)]
+        w = origin[next_halfedge(h)]
         if w < low or w >= high:
             return 0
         ring[i, 0] = X[w, 0]
         ring[i, 1] = X[w, 1]
         ring[i, 2] = X[w, 2]
-        h = np.int64(twin[previous(h)])
+        h = np.int64(twin[previous_halfedge(h)])
         if h == NONE:
             return 0
         if h == start:
@@ -285,7 +285,7 @@ def _search(X, birth, v, ring, n, tree, on_surface, limit, weight):
     best = _cost(ring, n, x, y, z, x, y, z, weight, scale, tree, face)
     step = _FIRST_STEP
     moved = 0
-    for _ in range(_ROUNDS):
+    for _ in range(_SEARCH_ROUNDS):
         if best <= limit or step < _LAST_STEP:
             break
         bx, by, bz, better_face = x, y, z, face

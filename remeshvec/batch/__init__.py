@@ -1,0 +1,1 @@
+"""Files and many meshes through the pipeline."""

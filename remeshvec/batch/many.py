@@ -1,0 +1,242 @@
+"""Many meshes: any number of them, one after another or in several processes."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Iterable, Iterator, Sized
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ..core.check import positive_count, positive_number
+from ..core.threads import available_threads
+from ..errors import BatchError, OptionError
+from ..files.plain import MeshFile, read_mesh
+from ..output.result import RemeshResult
+from ..pipeline.job import Lengths
+from ..pipeline.remesh import RemeshOptions, remesh
+from ..processes.pool import Outcome, run_here, run_in_processes
+from .progress import bar
+
+if TYPE_CHECKING:
+    from typing import Unpack
+
+__all__ = ["BatchItem", "one_line", "remesh_many", "warm_up"]
+
+
+@dataclass
+class BatchItem:
+    """What became of one item of a batch.
+
+    Attributes
+    ----------
+    index : int
+        Which item, counted from 0.
+    name : str
+        Its path, or what it is.
+    result : RemeshResult, or None where there is an error
+        What `remesh` returns.
+    error : Exception, or None
+        What went wrong: what `remesh` or `read_mesh` raise, or a `WorkerError`.
+    seconds : float
+        How long it took, in its process, with reading.
+    """
+
+    index: int
+    name: str
+    result: Any = field(repr=False)
+    error: Exception | None
+    seconds: float
+
+
+def remesh_many(
+    items: Iterable[Any],
+    L: Lengths | None = None,
+    *,
+    workers: int | None = None,
+    on_error: str = "raise",
+    ordered: bool = True,
+    progress: bool = False,
+    timeout: float | None = None,
+    **options: Unpack[RemeshOptions],
+) -> Iterator[BatchItem]:
+    """Remesh many meshes, in several processes.
+
+    Every result is the same, bit for bit, as that of a call of its own. Items are taken when they are
+    needed and results are not kept: any number of them fits into memory, given as a generator.
+    Processes end with the iterator, also by ``close()`` or an interrupt.
+
+    Parameters
+    ----------
+    items : iterable
+        Meshes: ``(V, F)``, the path of a file, what `read_mesh` or `remesh` return, or any other object
+        that `remesh` takes.
+    L : float, (n,) array, callable or Adaptive, optional
+        Target edge length, for all of them, as in `remesh`.
+    workers : int, optional
+        Number of processes, all available cores by default. 1 does everything in this process. Each
+        process uses its part of the cores for large meshes.
+    on_error : {"raise", "collect"}
+        What an item does that fails, for whatever reason, even if its process dies: end the batch with
+        an exception, or become a `BatchItem` with an ``error``, after which the others go on.
+    ordered : bool
+        Whether results come in the order of the items, or as they are completed.
+    progress : bool
+        Whether to show on the error stream how far it is: a bar with the package rich, lines without.
+    timeout : float, optional
+        Seconds that one item may take; then its process is ended, and it has failed. With this even
+        ``workers=1`` is a process.
+    **options
+        Of `remesh`. A function among them (``L``, ``callback``) runs in the workers; those that no
+        module holds by name need the package cloudpickle.
+
+    Yields
+    ------
+    BatchItem
+        One an item.
+
+    Raises
+    ------
+    BatchError
+        With ``on_error="raise"``, names the first item that failed; raised from its error.
+    OptionError
+        An argument cannot work, or cannot be sent to other processes.
+    WorkerError
+        No process can be started.
+
+    Examples
+    --------
+    >>> for item in remesh_many(paths, 0.1, on_error="collect"):  # doctest: +SKIP
+    ...     print(item.name, item.error or len(item.result.F))
+    """
+    _check(on_error, options.keys())
+    if workers is not None:
+        workers = positive_count(workers, "workers")
+    if timeout is not None:
+        timeout = positive_number(timeout, "timeout", "seconds")
+    if isinstance(items, str | bytes):
+        raise OptionError(f"items must be many; for one of them say [{items!r}]")
+    total = len(items) if isinstance(items, Sized) else None
+    workers = workers or available_threads()
+    is_here = workers == 1 and timeout is None
+    if total:
+        workers = min(workers, total)  # so that few large meshes get all cores
+    crew = _Crew(workers, is_here, ordered, timeout)
+    done = _with_names(iter(items), {"L": L, **options}, crew)
+    if on_error == "raise":
+        done = _raising(done)
+    return bar(done, total, lambda item: item.error is not None) if progress else done
+
+
+class _Crew(NamedTuple):
+    """Who does the work, and how."""
+
+    workers: int
+    is_here: bool  # nobody but this process
+    ordered: bool
+    timeout: float | None
+
+
+def _check(on_error: str, options: Iterable[str]) -> None:
+    """Refuse here what would fail for every item."""
+    if on_error not in ("raise", "collect"):
+        raise OptionError(f'on_error must be "raise" or "collect"; got {on_error!r}')
+    known = inspect.signature(remesh).parameters.keys() - {"V", "F", "L", "return_result"}
+    unknown = sorted(set(options) - known)
+    if unknown:
+        raise OptionError(f"there is no option {', '.join(unknown)}")
+
+
+def _with_names(items: Iterator[Any], options: dict[str, Any], crew: _Crew) -> Iterator[BatchItem]:
+    """Remesh, and put back what the workers did not need to be told."""
+    held: dict[int, tuple[str, Any]] = {}  # of the items on their way
+
+    def tasks() -> Iterator[Any]:
+        for index, item in enumerate(items):
+            mesh = _mesh_of(item)
+            held[index] = _name(item), mesh if _is_vertex_face_pair(mesh) else None
+            del item
+            yield mesh
+
+    for outcome in _item_outcomes(tasks(), options, crew):
+        name, arrays = held.pop(outcome.number)
+        index, result, error, seconds = outcome
+        del outcome
+        if arrays is not None and isinstance(result, RemeshResult):
+            result.report = replace(result.report, before=arrays)
+        yield BatchItem(index, name, result, error, seconds)
+        del result, arrays
+
+
+def _item_outcomes(tasks: Iterator[Any], options: dict[str, Any], crew: _Crew) -> Iterator[Outcome]:
+    if crew.is_here:
+        return run_here(_remesh_here, tasks, options)
+    return run_in_processes(
+        _remesh_there, tasks, options, crew.workers, crew.ordered, crew.timeout,
+        None if crew.timeout is None else warm_up,
+    )  # fmt: skip
+
+
+def warm_up() -> None:
+    """Load kernels, or compile them: that takes its time, and is no item's fault."""
+    faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    remesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces, 0.3)
+
+
+def _raising(done: Iterator[BatchItem]) -> Iterator[BatchItem]:
+    try:
+        for item in done:
+            if item.error is not None:
+                raise BatchError(item.index, item.name, one_line(item.error)) from item.error
+            yield item
+    finally:
+        done.close()  # type: ignore[attr-defined]  # now: the exception may be held for long
+
+
+def _mesh_of(item: Any) -> Any:
+    """Return ``(V, F)``, a path, or what only `remesh` knows what to do with."""
+    if isinstance(item, MeshFile | RemeshResult):
+        return item.V, item.F
+    if isinstance(item, list) and len(item) == 2:
+        return tuple(item)
+    return os.fspath(item) if isinstance(item, os.PathLike) else item
+
+
+def _is_vertex_face_pair(mesh: Any) -> bool:
+    return isinstance(mesh, tuple) and len(mesh) == 2
+
+
+def _name(item: Any) -> str:
+    if isinstance(item, str | os.PathLike):
+        return os.fsdecode(item)
+    mesh = _mesh_of(item)
+    if not _is_vertex_face_pair(mesh):
+        return f"an object of type {type(item).__name__}"
+    try:
+        return f"{len(mesh[0]):,} vertices, {len(mesh[1]):,} faces"
+    except TypeError:
+        return "a pair of what are no arrays"
+
+
+def _remesh_here(mesh: Any, options: dict[str, Any]) -> Any:
+    """Remesh one item, of whatever kind."""
+    if isinstance(mesh, str):
+        mesh = read_mesh(mesh)[:2]
+    if _is_vertex_face_pair(mesh):
+        return remesh(*mesh, **options)
+    call: Any = remesh
+    return call(mesh, **options)
+
+
+def _remesh_there(mesh: Any, options: dict[str, Any]) -> Any:
+    """Remesh one item; arrays that came from the caller are not sent back to it."""
+    result = _remesh_here(mesh, options)
+    if _is_vertex_face_pair(mesh) and isinstance(result, RemeshResult):
+        result.report = replace(result.report, before=((), ()))
+    return result
+
+
+def one_line(error: Exception) -> str:
+    """Name an error and what it says, in one line."""
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

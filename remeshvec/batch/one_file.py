@@ -1,0 +1,52 @@
+"""One file with all that it carries: read, remeshed, written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..files.plain import PATHS
+from ..files.with_data import check_data_writable, read_data, write_data
+from ..interop.mesh_data import MeshData, carry
+from ..output.result import RemeshResult
+from ..pipeline.remesh import RemeshOptions, remesh
+
+if TYPE_CHECKING:
+    from typing import Unpack
+
+__all__ = ["remesh_file", "with_feature_data"]
+
+
+def remesh_file(
+    source: PATHS, target: PATHS, L: Any = None, **options: Unpack[RemeshOptions]
+) -> RemeshResult:
+    """Remesh a file with its colours, texture coordinates, fields and groups, where formats hold them.
+
+    Parameters
+    ----------
+    source, target : str or path
+        Files; their suffixes give the formats. OBJ, OFF, PLY, STL and JSON, and what meshio (VTK, VTU,
+        Gmsh, XDMF, ...), pyvista (VTP) and trimesh (glTF) know, where these are installed.
+    L : float, array, callable or Adaptive, optional
+    **options
+        See `remesh`.
+
+    Returns
+    -------
+    RemeshResult
+
+    Raises
+    ------
+    MeshFormatError
+        A file cannot be read or written.
+    """
+    check_data_writable(target)
+    data, _ = read_data(source)
+    result = remesh(data.V, data.F, L, **with_feature_data(data, options))
+    write_data(target, carry(data, result))
+    return result
+
+
+def with_feature_data(data: MeshData, options: Any) -> dict[str, Any]:
+    """Return the options, with what the data want to be kept."""
+    kept = data.preserved(options.get("preserve"))
+    return {**options, "preserve": kept} if kept else dict(options)

@@ -1,0 +1,7 @@
+"""The shell command."""
+
+from .command import main
+
+__all__ = [
+    "main",
+]

@@ -1,0 +1,332 @@
+"""The arguments of the shell command."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import Any
+
+from ..core.version import __version__
+from ..errors import OptionError
+from ..files.plain import MeshFile
+from ..files.with_data import COMMON_SUFFIXES
+from ..measures.quality import quality
+from ..sizing.adaptive import Adaptive
+
+__all__ = ["batch_parser", "given_options", "parser", "target_length"]
+
+DEFAULT_FACTOR = 0.9  # of the mean edge length; what the library takes when no length is given
+
+EPILOG = """\
+examples:
+  remeshvec cat.obj                                   show what remeshing brings
+  remeshvec cat.obj -o even.obj                       write the new mesh
+  remeshvec part.stl -o part.ply --length 0.5         edges of length 0.5
+  remeshvec cat.obj -o even.obj --picture even.png    and a picture of both
+  remeshvec cat.obj --html report.html                a page to look at and to send around
+  remeshvec part.stl -o part.ply --feature-angle 30   keep edges that turn by more than 30 degrees
+  remeshvec cat.obj -o fine.obj --adaptive 0.001      short edges where the surface is curved
+
+  remeshvec batch 'in/*.obj' --out even               many meshes; see remeshvec batch --help
+
+FILE of numbers: text (white space or commas, # starts a comment) or .npy; indices count from 0.
+"""
+
+BATCH_EPILOG = """\
+examples:
+  remeshvec batch 'in/*.obj' --out even                 all OBJ files of a folder
+  remeshvec batch 'in/**/*.stl' --out even --format ply --table even.parquet
+
+The same command again goes on after an interrupt, repeats what failed, and what was made from another
+input or with other options.
+
+exit status: 0 all meshes are done, 3 some failed, 2 bad arguments, 130 interrupted
+"""
+
+# Arguments that the library knows under the same name.
+_SAME = (
+    "iterations",
+    "tol",
+    "split",
+    "collapse",
+    "foldover",
+    "sliver_check",
+    "fit",
+    "threads",
+    "gradation",
+    "n_faces",
+    "n_vertices",
+    "max_deviation",
+)
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the shell command's arguments."""
+    result = argparse.ArgumentParser(
+        prog="remeshvec",
+        description="Remesh a triangle mesh to even triangles.\n"
+        "Reads and writes OBJ, OFF, PLY, STL, and JSON with the keys verts and faces; and what meshio\n"
+        "(VTK, VTU, Gmsh, XDMF, ...), pyvista (VTP) and trimesh (glTF) know, if installed.\n"
+        "Colours, texture coordinates, fields and groups come along if the format can hold them.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    result.add_argument("input", metavar="INPUT", help="mesh file")
+    result.add_argument("-o", "--output", metavar="OUTPUT", help="mesh file to write")
+    lengths = _add_size_options(result.add_argument_group("how long edges become"))
+    lengths.add_argument("--lengths", metavar="FILE", help="target edge length at every vertex")
+    keep = result.add_argument_group("what to keep")
+    _add_constraints(keep)
+    _add_files_of_constraints(keep)
+    _add_remesh_options(result.add_argument_group("how to remesh"))
+    _add_report_options(result.add_argument_group("what to show and save"))
+    return result
+
+
+def batch_parser() -> argparse.ArgumentParser:
+    """Return the parser of ``remeshvec batch``: all that does not name elements of one mesh."""
+    result = argparse.ArgumentParser(
+        prog="remeshvec batch",
+        description="Remesh many triangle meshes, several at a time.",
+        epilog=BATCH_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    result.add_argument(
+        "inputs",
+        metavar="INPUT",
+        nargs="+",
+        help="mesh files, or patterns in quotes; ** stands for folders in folders",
+    )
+    result.add_argument(
+        "--out",
+        metavar="DIR",
+        required=True,
+        help="folder to write to; folders of the inputs are kept below it",
+    )
+    result.add_argument(
+        "--format",
+        choices=[suffix[1:] for suffix in COMMON_SUFFIXES],
+        help="format to write (default: that of each input)",
+    )
+    result.add_argument(
+        "--workers", type=_at_least_one, metavar="N", help="meshes at a time (default: all cores)"
+    )
+    result.add_argument(
+        "--timeout",
+        type=_positive_number,
+        metavar="S",
+        help="seconds after which a mesh is given up",
+    )
+    result.add_argument("--force", action="store_true", help="repeat also what is done")
+    result.add_argument(
+        "--table",
+        metavar="FILE",
+        help="table of results, .csv (default DIR/results.csv) or .parquet (beside that)",
+    )
+    result.add_argument("--quiet", action="store_true", help="show errors only")
+    result.add_argument("--version", action="version", version=f"remeshvec {__version__}")
+    _add_size_options(result.add_argument_group("how long edges become"))
+    _add_constraints(result.add_argument_group("what to keep"))
+    _add_remesh_options(result.add_argument_group("how to remesh"))
+    return result
+
+
+def target_length(options: argparse.Namespace, mesh: MeshFile) -> Any:
+    """Return the target length, None for the library's default or where a count is asked for."""
+    if options.adaptive is not None:
+        return Adaptive(options.adaptive, options.min_length, options.max_length)
+    if options.min_length is not None or options.max_length is not None:
+        raise OptionError("--min-length and --max-length go with --adaptive")
+    if options.length is not None or options.l_factor == DEFAULT_FACTOR:
+        return options.length
+    return options.l_factor * quality(mesh.V, mesh.F).edge_mean
+
+
+def given_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Return those options that were given, so that the presets decide on the others."""
+    given = {name: getattr(options, name) for name in _SAME}
+    given["project"] = False if options.no_project else None
+    chosen = {
+        "preset": options.preset,
+        "feature_angle": options.feature_angle,
+        "boundary": options.boundary,
+    }
+    return chosen | {k: v for k, v in given.items() if v is not None}
+
+
+def _add_size_options(
+    group: argparse._ArgumentGroup,
+) -> argparse._MutuallyExclusiveGroup:
+    """Add them; returns those that exclude each other."""
+    length = group.add_mutually_exclusive_group()
+    length.add_argument("--length", type=_positive_number, metavar="L", help="target edge length")
+    length.add_argument(
+        "--l-factor",
+        type=_positive_number,
+        default=DEFAULT_FACTOR,
+        metavar="X",
+        help="target edge length as a multiple of the mean edge length (default %(default)s)",
+    )
+    length.add_argument(
+        "--adaptive",
+        type=_positive_number,
+        metavar="TOL",
+        help="edge length from the curvature, so that faces stay within TOL of the surface",
+    )
+    length.add_argument("--n-faces", type=_at_least_one, metavar="N", help="number of faces wanted")
+    length.add_argument(
+        "--n-vertices", type=_at_least_one, metavar="N", help="number of vertices wanted"
+    )
+    group.add_argument(
+        "--min-length", type=_positive_number, metavar="L", help="shortest length for --adaptive"
+    )
+    group.add_argument(
+        "--max-length", type=_positive_number, metavar="L", help="longest length for --adaptive"
+    )
+    group.add_argument(
+        "--gradation",
+        type=_positive_number,
+        metavar="X",
+        help="largest ratio of the lengths at the ends of an edge (default 1.5)",
+    )
+    group.add_argument(
+        "--max-deviation",
+        type=_positive_number,
+        metavar="D",
+        help="largest distance between the input and the result",
+    )
+    return length
+
+
+def _add_constraints(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--feature-angle",
+        type=_feature_angle,
+        default="auto",
+        metavar="DEG",
+        help="keep edges that turn by more; auto: those that stand out (default), none: no edges",
+    )
+    group.add_argument(
+        "--boundary",
+        choices=("free", "split", "fixed"),
+        default="free",
+        help="boundary vertices slide along it (free), stay and get new ones between (split), or "
+        "stay as they are (fixed)",
+    )
+
+
+def _add_files_of_constraints(group: argparse._ArgumentGroup) -> None:
+    group.add_argument("--feature-edges", metavar="FILE", help="edges to keep, two vertices each")
+    group.add_argument("--fixed-vertices", metavar="FILE", help="vertices that stay")
+    group.add_argument("--fixed-faces", metavar="FILE", help="faces that stay")
+    group.add_argument(
+        "--selection", metavar="FILE", help="faces to remesh; all others stay and come first"
+    )
+    group.add_argument(
+        "--face-labels", metavar="FILE", help="a whole number a face, whose borders are kept"
+    )
+
+
+def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--preset",
+        choices=("default", "fast", "fine"),
+        default="default",
+        help="fast: the published algorithm; fine: more sweeps and a closer fit",
+    )
+    group.add_argument(
+        "--iterations", type=_at_least_one, metavar="N", help="number of sweeps at most"
+    )
+    group.add_argument(
+        "--tol",
+        type=_positive_number,
+        metavar="X",
+        help="stop when a sweep changes less than this share of the edges and moves vertices by less "
+        "than this multiple of the target length",
+    )
+    group.add_argument(
+        "--split",
+        type=_positive_number,
+        metavar="X",
+        help="split edges longer than this multiple of the target length",
+    )
+    group.add_argument(
+        "--collapse",
+        type=_positive_number,
+        metavar="X",
+        help="collapse edges shorter than this multiple of the target length",
+    )
+    group.add_argument(
+        "--foldover",
+        type=_positive_number,
+        metavar="DEG",
+        help="largest angle that a normal may turn by in a collapse, in degrees",
+    )
+    group.add_argument(
+        "--sliver-check",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="refuse flips and collapses that make the shapes of triangles worse",
+    )
+    group.add_argument(
+        "--no-project",
+        action="store_true",
+        help="do not put the vertices back onto the input surface",
+    )
+    group.add_argument(
+        "--fit",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="let vertices leave the input a little so that faces lie closer to it",
+    )
+    group.add_argument("--threads", type=_at_least_one, metavar="N", help="number of threads")
+
+
+def _add_report_options(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--save-stats", metavar="FILE", help="write the measures before and after, as JSON"
+    )
+    group.add_argument(
+        "--save-arrays",
+        metavar="FILE",
+        help="write births of vertices, faces and corners, images of the input's vertices, labels, maps, "
+        "feature edges, corners and lengths, as .npz",
+    )
+    group.add_argument(
+        "--picture", metavar="FILE", help="render both meshes side by side (PNG or JPEG)"
+    )
+    group.add_argument(
+        "--html",
+        metavar="FILE",
+        help="write a page that shows both meshes, histograms and measures",
+    )
+    group.add_argument("--visualize", action="store_true", help="show both meshes in a window")
+    group.add_argument(
+        "--up",
+        choices=("y", "z"),
+        default="y",
+        help="axis that points up in what is shown (default y)",
+    )
+    group.add_argument("--timing", action="store_true", help="show the seconds of every phase")
+    group.add_argument("--quiet", action="store_true", help="show errors only")
+    group.add_argument("--version", action="version", version=f"remeshvec {__version__}")
+
+
+def _positive_number(text: str) -> float:
+    value = float(text)
+    if not (value > 0 and math.isfinite(value)):
+        raise argparse.ArgumentTypeError(f"{text} is not a positive number")
+    return value
+
+
+def _at_least_one(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is less than 1")
+    return value
+
+
+def _feature_angle(text: str) -> float | str | None:
+    if text in ("auto", "none"):
+        return None if text == "none" else text
+    return _positive_number(text)

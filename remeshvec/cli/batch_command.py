@@ -1,0 +1,271 @@
+"""``remeshvec batch``: many files, several at a time; goes on where an earlier run was interrupted."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import statistics
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import remeshvec
+
+from ..batch.many import one_line, warm_up
+from ..batch.one_file import with_feature_data
+from ..batch.progress import bar
+from ..core.threads import available_threads
+from ..errors import MeshFormatError, OptionError
+from ..files.plain import MeshFile, check_writable, write_file
+from ..files.with_data import check_data_writable, read_data, write_data
+from ..interop.mesh_data import carry
+from ..processes.pool import run_here, run_in_processes
+from .arguments import batch_parser, given_options, target_length
+from .batch_files import FileJob, find_jobs, refuse_collisions
+from .batch_table import COLUMNS, MEASURES, Row, Table, write_parquet
+
+__all__ = ["EXIT_SOME_FAILED", "parsed", "run"]
+
+EXIT_SOME_FAILED = 3
+_SHOWN = 10  # failures in the summary on the terminal; the table has all
+
+# What decides where meshes go and who makes them, not what they become.
+_NOT_OPTIONS = (
+    "inputs",
+    "out",
+    "format",
+    "workers",
+    "timeout",
+    "force",
+    "table",
+    "quiet",
+    "threads",
+)
+
+
+def parsed(words: Sequence[str]) -> argparse.Namespace:
+    """Parse the arguments after ``batch``."""
+    return batch_parser().parse_args(words)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Remesh all files that are not done yet; returns the exit status."""
+    start = time.perf_counter()
+    batch = _prepared(options)
+    todo = [job for job in batch.jobs if options.force or not _is_done(job, batch)]
+    for job in set(batch.jobs).difference(todo):
+        batch.current[job.output] = batch.table.rows[job.output]
+    skipped = len(batch.current)
+    if skipped and not options.quiet:
+        print(f"{skipped:,} of {len(batch.jobs):,} meshes are done already", flush=True)
+    batch.table.open()
+    try:
+        _run_jobs(todo, batch)
+    finally:  # also after an interrupt: all rows are in the table, and what is missing is named
+        batch.table.close()
+        summary = _summary(batch, skipped, time.perf_counter() - start)
+        write_file(_summary_file(options), (json.dumps(summary, indent=2) + "\n").encode())
+        if _is_parquet(options):
+            write_parquet(options.table, batch.table.in_order())
+        if not options.quiet:
+            _print(summary, options)
+    return EXIT_SOME_FAILED if summary["failed"] else 0
+
+
+class _Batch(NamedTuple):
+    """What is to be done, and what is known of it."""
+
+    options: argparse.Namespace
+    jobs: list[FileJob]
+    table: Table
+    recipe: str  # names the options that decide on the result
+    current: dict[str, Row]  # what is done, failures too, by the names of outputs
+
+    def fresh(self, job: FileJob) -> Row:
+        """Return the row of a job before its work: everything that makes it its own."""
+        row: Row = dict.fromkeys(COLUMNS, "") | {"input": job.input, "output": job.output}
+        try:
+            found = os.stat(job.input)
+            row |= {"input_bytes": found.st_size, "input_mtime_ns": found.st_mtime_ns}
+        except OSError:  # it has gone; reading it will say so
+            pass
+        return row | {"options": self.recipe, "version": remeshvec.__version__}
+
+
+def _prepared(options: argparse.Namespace) -> _Batch:
+    """Find all files and refuse what cannot work, before any work."""
+    _check_arguments(options)
+    table = Table(_table_file(options))
+    made = {os.path.realpath(os.path.join(options.out, name)) for name in table.rows}
+    suffix = f".{options.format}" if options.format else None
+    jobs = find_jobs(options.inputs, options.out, suffix, made)
+    written = [table.path, _summary_file(options)]
+    written += [options.table] if _is_parquet(options) else []
+    refuse_collisions(jobs, written)
+    for folder in sorted({options.out, *(os.path.dirname(job.path) for job in jobs)}):
+        try:
+            os.makedirs(folder, exist_ok=True)
+        except OSError as error:
+            raise MeshFormatError(f"cannot write to {folder}: {error.strerror}") from error
+    for path in written:
+        check_writable(path)
+    for job in {os.path.splitext(job.path)[1]: job for job in jobs}.values():
+        check_data_writable(job.path)
+    return _Batch(options, jobs, table, _recipe(options), {})
+
+
+def _check_arguments(options: argparse.Namespace) -> None:
+    if options.adaptive is None and (options.min_length or options.max_length):
+        raise OptionError("--min-length and --max-length go with --adaptive")
+    if options.table and Path(options.table).suffix.lower() not in (".csv", ".parquet"):
+        raise OptionError(f"--table {options.table}: the suffix must be .csv or .parquet")
+    if _is_parquet(options):
+        try:
+            import pyarrow  # noqa: F401
+        except ImportError:
+            raise OptionError("Parquet needs the package pyarrow (pip install pyarrow)") from None
+
+
+def _is_parquet(options: argparse.Namespace) -> bool:
+    return bool(options.table) and Path(options.table).suffix.lower() == ".parquet"
+
+
+def _table_file(options: argparse.Namespace) -> str:
+    """Return the table that rows are appended to, which Parquet cannot be."""
+    if options.table and not _is_parquet(options):
+        return str(options.table)
+    return os.path.join(options.out, "results.csv")
+
+
+def _summary_file(options: argparse.Namespace) -> str:
+    return os.path.join(options.out, "summary.json")
+
+
+def _recipe(options: argparse.Namespace) -> str:
+    """Name the options that decide on the results."""
+    chosen = {k: v for k, v in sorted(vars(options).items()) if k not in _NOT_OPTIONS}
+    return hashlib.sha256(json.dumps(chosen).encode()).hexdigest()[:12]
+
+
+def _is_done(job: FileJob, batch: _Batch) -> bool:
+    """Whether the output is there and was made from this input, with these options, by this version."""
+    row = batch.table.rows.get(job.output)
+    if row is None or row["error"] or not os.path.isfile(job.path):
+        return False
+    same = ("input_bytes", "input_mtime_ns", "options", "version")
+    now = batch.fresh(job)
+    return all(str(row[name]) == str(now[name]) for name in same)
+
+
+# -- the work -------------------------------------------------------------------------------------
+
+
+def _run_jobs(todo: list[FileJob], batch: _Batch) -> None:
+    """Do what is left; every outcome goes to the table at once."""
+    rows = [batch.fresh(job) for job in todo]  # before: a file that changes meanwhile is done again
+    outcomes: Any = _outcomes(todo, batch.options)
+    if not batch.options.quiet:
+        outcomes = bar(outcomes, len(todo), lambda outcome: outcome.error is not None)
+    try:
+        for outcome in outcomes:
+            row = rows[outcome.number] | {"seconds": f"{outcome.seconds:.4f}"}
+            if outcome.error is None:
+                row |= outcome.value
+            else:
+                row["error"] = one_line(outcome.error)
+            batch.table.add(row)
+            batch.current[row["output"]] = row
+    finally:
+        outcomes.close()
+
+
+def _outcomes(todo: list[FileJob], options: argparse.Namespace) -> Any:
+    workers = options.workers or available_threads()
+    if workers == 1 and options.timeout is None:
+        return run_here(_remesh_file, todo, options)
+    workers = max(1, min(workers, len(todo)))
+    return run_in_processes(
+        _remesh_file, todo, options, workers, False, options.timeout,
+        None if options.timeout is None else warm_up,
+    )  # fmt: skip
+
+
+def _remesh_file(job: FileJob, options: argparse.Namespace) -> Row:
+    """Read, remesh, write; return what is known of it."""
+    data, notices = read_data(job.input)
+    mesh = MeshFile(data.V, data.F, notices)
+    length = target_length(options, mesh)
+    result = remeshvec.remesh(
+        mesh.V, mesh.F, length, **with_feature_data(data, given_options(options))
+    )
+    write_data(job.path, carry(data, result))
+    report = result.report
+    row: Row = {
+        "vertices_before": len(mesh.V),
+        "faces_before": len(mesh.F),
+        "vertices_after": len(result.V),
+        "faces_after": len(result.F),
+        "target_length": f"{report.target_length:.9g}",
+    }
+    for when, measured in (("before", report.quality_before), ("after", report.quality_after)):
+        for name, attribute in MEASURES.items():
+            row[f"{name}_{when}"] = f"{getattr(measured, attribute):.6g}"
+    return row
+
+
+# -- the summary ----------------------------------------------------------------------------------
+
+
+def _summary(batch: _Batch, skipped: int, seconds: float) -> dict[str, Any]:
+    """Sum up what was done, in earlier runs too."""
+    rows = [batch.current[job.output] for job in batch.jobs if job.output in batch.current]
+    good = [row for row in rows if not row["error"]]
+    failed = [row for row in rows if row["error"]]
+    return {
+        "meshes": len(batch.jobs),
+        "good": len(good),
+        "done_before": skipped,
+        "failed": len(failed),
+        "not_done": len(batch.jobs) - len(rows),
+        "seconds": round(seconds, 3),
+        "faces_before": sum(int(row["faces_before"]) for row in good),
+        "faces_after": sum(int(row["faces_after"]) for row in good),
+        "medians": {name: _medians(good, name) for name in MEASURES} if good else {},
+        "failures": {row["input"]: row["error"] for row in failed},
+        "options": batch.recipe,
+        "version": remeshvec.__version__,
+    }
+
+
+def _medians(rows: list[Row], name: str) -> dict[str, float]:
+    return {
+        when: statistics.median(float(row[f"{name}_{when}"]) for row in rows)
+        for when in ("before", "after")
+    }
+
+
+def _print(summary: dict[str, Any], options: argparse.Namespace) -> None:
+    print(
+        f"{summary['good']:,} of {summary['meshes']:,} meshes are done, {summary['failed']:,} failed, "
+        f"in {summary['seconds']:.1f} s"
+    )
+    if summary["good"]:
+        print(f"faces: {summary['faces_before']:,} before, {summary['faces_after']:,} after")
+        for name, median in summary["medians"].items():
+            label = f"{name.replace('_', ' ')}, median"
+            print(f"{label:<24}{median['before']:>10.4g} before{median['after']:>10.4g} after")
+    for shown, (path, error) in enumerate(summary["failures"].items()):
+        if shown == _SHOWN:
+            print(f"and {summary['failed'] - _SHOWN:,} more, in the table")
+            break
+        print(f"failed: {path}: {error}")
+    print(f"written: {_table_file(options)}, {_summary_file(options)}", flush=True)
+    if summary["not_done"]:
+        print(
+            f"{summary['not_done']:,} meshes are not done; the same command goes on with them",
+            file=sys.stderr,
+        )

@@ -1,0 +1,115 @@
+"""Which files a batch reads and writes: patterns, names in the folder of results, what collides."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from ..errors import OptionError
+from ..files.with_data import COMMON_SUFFIXES
+
+__all__ = ["FileJob", "find_jobs", "refuse_collisions"]
+
+
+class FileJob(NamedTuple):
+    """One mesh of a batch."""
+
+    input: str  # as it was found
+    output: str  # below the folder of results, with slashes: what identifies the job
+    path: str  # of the output
+
+
+class _Found(NamedTuple):
+    path: str
+    root: str  # what comes before the first wildcard
+
+
+def find_jobs(
+    patterns: Sequence[str], folder: str, suffix: str | None, made: Collection[str] = ()
+) -> list[FileJob]:
+    """Look for inputs and name their outputs.
+
+    The folders that all patterns share before their first wildcard are left out of the names of
+    outputs, the others are kept: ``in/a/x.obj`` and ``in/b/x.obj`` become ``a/x.obj`` and ``b/x.obj``.
+
+    Parameters
+    ----------
+    patterns : sequence of str
+        Paths, or patterns as `glob` has them.
+    folder : str
+        Where outputs go.
+    suffix : str, optional
+        Of the outputs; by default that of each input.
+    made : collection of str
+        Outputs of earlier runs, as full paths, which patterns pass over.
+
+    Raises
+    ------
+    OptionError
+        A pattern matches nothing, or names a folder, or inputs have no folder in common.
+    """
+    found = [file for pattern in patterns for file in _files(pattern, made)]
+    if not found:  # everything was made by earlier runs
+        raise OptionError(f"{' '.join(patterns)}: only results of earlier runs")
+    try:
+        root = os.path.commonpath([os.path.abspath(file.root) for file in found])
+    except ValueError as error:
+        raise OptionError(f"the inputs have no folder in common: {error}") from error
+    jobs: dict[str, FileJob] = {}
+    for path, _ in found:
+        name = Path(os.path.relpath(os.path.abspath(path), root))
+        output = (name if suffix is None else name.with_suffix(suffix)).as_posix()
+        jobs.setdefault(os.path.realpath(path), FileJob(path, output, os.path.join(folder, output)))
+    return list(jobs.values())
+
+
+def _files(pattern: str, made: Collection[str]) -> list[_Found]:
+    if os.path.isfile(pattern):
+        return [_Found(pattern, os.path.dirname(pattern))]
+    if os.path.isdir(pattern):
+        raise OptionError(
+            f"{pattern} is a folder; say '{os.path.join(pattern, '*.obj')}' in quotes"
+        )
+    names = sorted(glob.glob(pattern, recursive=True))
+    files = [
+        name
+        for name in names
+        if Path(name).suffix.lower() in COMMON_SUFFIXES and os.path.isfile(name)
+    ]
+    if not files:
+        raise OptionError(f"{pattern}: there is no such mesh file")
+    root = _root(pattern)
+    return [_Found(name, root) for name in files if os.path.realpath(name) not in made]
+
+
+def _root(pattern: str) -> str:
+    """Return the folders before the first wildcard."""
+    parts = Path(pattern).parts
+    fixed = next(i for i, part in enumerate(parts) if glob.has_magic(part))
+    return os.path.join(*parts[:fixed]) if fixed else ""
+
+
+def refuse_collisions(jobs: Iterable[FileJob], others: Iterable[str]) -> None:
+    """Refuse outputs with the same name, or with that of an input, or of another file to be written.
+
+    Raises
+    ------
+    OptionError
+        There are such.
+    """
+    jobs = list(jobs)
+    taken = {os.path.realpath(path): "the batch itself writes it" for path in others}
+    for job in jobs:
+        if os.path.realpath(job.input) in taken:
+            raise OptionError(
+                f"{job.input} would be replaced: the batch writes a file of this name"
+            )
+    taken |= {os.path.realpath(job.input): f"{job.input} is an input" for job in jobs}
+    for job in jobs:
+        reason = taken.setdefault(os.path.realpath(job.path), "")
+        if reason:
+            raise OptionError(f"{job.input} cannot be written to {job.path}: {reason}")
+        taken[os.path.realpath(job.path)] = f"{job.input} goes there"

@@ -1,0 +1,286 @@
+"""The shell command: read a mesh, remesh it, show that it got better, write it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+import remeshvec
+
+from ..batch.one_file import with_feature_data
+from ..errors import OptionError, RemeshvecError
+from ..files.plain import MeshFile, check_writable, write_file
+from ..files.with_data import check_data_writable, read_data, write_data
+from ..interop.mesh_data import carry
+from ..measures.quality import side_by_side
+from ..output.result import RemeshResult
+from .arguments import given_options, parser, target_length
+from .array_files import read_array, write_arrays
+
+__all__ = ["main"]
+
+PATIENCE = 1.0  # seconds of silence before progress is shown
+EXIT_ERROR, EXIT_FAILURE, EXIT_INTERRUPTED = 2, 1, 130  # 130 = 128 + SIGINT, as shells have it
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the shell command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; those of the process by default.
+
+    Returns
+    -------
+    int
+        Exit status: 0, 2 for bad input, 130 after Ctrl-C, 1 where memory or the terminal failed, 3
+        where some meshes of a batch failed.
+    """
+    words = sys.argv[1:] if argv is None else list(argv)
+    if words[:1] == ["batch"]:  # a file of this name is ./batch
+        from . import batch_command as _batch_command
+
+        return _ends(_batch_command.run, _batch_command.parsed(words[1:]))
+    options = parser().parse_args(words)
+    options.call = shlex.join(["remeshvec", *words])
+    return _ends(_run, options)
+
+
+def _ends(work: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
+    """Do the work; return the exit status, and say what went wrong in one line."""
+    try:
+        status = work(options)
+        sys.stdout.flush()
+    except RemeshvecError as error:
+        return _failed(str(error), EXIT_ERROR)
+    except KeyboardInterrupt:
+        return _failed("interrupted, nothing more was written", EXIT_INTERRUPTED)
+    except MemoryError:
+        return _failed("there is not enough memory", EXIT_FAILURE)
+    except BrokenPipeError:  # the reader of a pipe has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_FAILURE
+    return status
+
+
+def _failed(reason: str, status: int) -> int:
+    print(f"remeshvec: {reason}", file=sys.stderr)
+    return status
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Do everything that the arguments ask for."""
+    _check_outputs(options)
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "read"):
+        data, notices = read_data(options.input)
+    mesh = MeshFile(data.V, data.F, notices)
+    with _progress(options.quiet) as callback:
+        result = remeshvec.remesh(
+            mesh.V,
+            mesh.F,
+            _length(options, mesh),
+            callback=callback,
+            **with_feature_data(data, _library_options(options)),
+        )
+    seconds |= result.report.seconds
+    if options.output:
+        with _timed(seconds, "write"):
+            lost = write_data(options.output, carry(data, result))
+        if lost:
+            notices.append(f"{Path(options.output).suffix} files cannot hold: {', '.join(lost)}")
+    if options.save_stats:
+        _save_stats(options, mesh, result)
+    if options.save_arrays:
+        write_arrays(options.save_arrays, result)
+    if options.picture:
+        _make_picture(options, mesh, result)
+    if options.html:
+        _write_page(options, result)
+    if not options.quiet:
+        _print_report(options, mesh, result, seconds)
+    if options.visualize:
+        from .. import viz
+
+        viz.show((mesh.V, mesh.F), (result.V, result.F), up=options.up)
+    return 0
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    """Refuse before the work starts what could not be written or shown after it."""
+    if options.output:
+        check_data_writable(options.output)
+    for path in (options.save_stats, options.save_arrays):
+        if path:
+            check_writable(path)
+    if options.picture or options.visualize:
+        from .. import viz
+
+        viz.require_viewer(window=options.visualize)
+        if options.picture:
+            check_writable(options.picture, viz.PICTURE_SUFFIXES)
+    if options.html:
+        from .. import html_page
+
+        html_page.require_plotly()
+        check_writable(options.html, html_page.PAGE_SUFFIXES)
+    paths = [Path(name).resolve() for name in _outputs(options)]
+    if len(set(paths)) < len(paths):
+        raise OptionError("all files to be written need names of their own")
+    if Path(options.input).resolve() in paths[bool(options.output) :]:
+        raise OptionError(f"what is written beside the mesh would replace {options.input}")
+
+
+def _outputs(options: argparse.Namespace) -> list[str]:
+    """Return the files that are to be written, the mesh first."""
+    named = [options.output, options.save_stats, options.save_arrays, options.picture, options.html]
+    return [name for name in named if name]
+
+
+def _length(options: argparse.Namespace, mesh: MeshFile) -> Any:
+    """Return the target length, None for the library's default or where a count is asked for."""
+    length = target_length(options, mesh)
+    return length if options.lengths is None else read_array(options.lengths, whole=False)
+
+
+# Arguments that name files of indices, with the numbers in a row.
+_ARRAYS = {
+    "feature_edges": 2,
+    "fixed_vertices": 1,
+    "fixed_faces": 1,
+    "selection": 1,
+    "face_labels": 1,
+}
+
+
+def _library_options(options: argparse.Namespace) -> dict[str, Any]:
+    """Return those options that were given, with the arrays that they name."""
+    given = given_options(options)
+    for name, columns in _ARRAYS.items():
+        path = getattr(options, name)
+        if path is not None:
+            given[name] = read_array(path, columns)
+    return given
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[name] = time.perf_counter() - start
+
+
+class Progress:
+    """Tells on a stream how far the work is, once it has lasted longer than `PATIENCE`.
+
+    On a terminal one line is rewritten; elsewhere, in a log, every sweep gets a line.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+        self.rewrites = stream.isatty()
+        self.start = time.perf_counter()
+        self.shown = -1  # the sweep that was told last
+
+    def __call__(self, sweep: int, phase: str, count: int) -> None:
+        """Take note of a phase that is done; the library calls this."""
+        passed = time.perf_counter() - self.start
+        if passed < PATIENCE or (sweep == self.shown and not self.rewrites):
+            return
+        self.shown = sweep
+        text = f"sweep {sweep + 1}, {passed:.0f} s"
+        if self.rewrites:
+            print(f"\r\x1b[K{text}, {phase} {count:,}", end="", file=self.stream, flush=True)
+        else:
+            print(text, file=self.stream, flush=True)
+
+    def clear(self) -> None:
+        """Take the line away."""
+        if self.rewrites and self.shown >= 0:
+            print("\r\x1b[K", end="", file=self.stream, flush=True)
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Progress | None]:
+    if quiet:
+        yield None
+        return
+    progress = Progress(sys.stderr)
+    try:
+        yield progress
+    finally:
+        progress.clear()
+
+
+def _make_picture(options: argparse.Namespace, mesh: MeshFile, result: RemeshResult) -> None:
+    from .. import viz
+
+    viz.picture(options.picture, (mesh.V, mesh.F), (result.V, result.F), up=options.up)
+
+
+def _write_page(options: argparse.Namespace, result: RemeshResult) -> None:
+    from .. import html_page
+
+    title = Path(options.input).name
+    html_page.write_html(options.html, result, title=title, command=options.call, up=options.up)
+
+
+def _save_stats(options: argparse.Namespace, mesh: MeshFile, result: RemeshResult) -> None:
+    content = {
+        "input": options.input,
+        "output": options.output,
+        "notices": mesh.notices,
+        **result.report.to_dict(),
+    }
+    write_file(options.save_stats, (json.dumps(_plain(content), indent=2) + "\n").encode())
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON can hold it: NaN and infinity, which it lacks, become null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _print_report(
+    options: argparse.Namespace, mesh: MeshFile, result: RemeshResult, seconds: dict[str, float]
+) -> None:
+    report = result.report
+    for notice in mesh.notices:
+        print(f"note: {notice}")
+    for name, count in report.dirt.items():
+        print(f"note: {name.replace('_', ' ')}: {count:,}")
+    kept = {name: count for name, count in report.features.items() if count}
+    if kept:
+        print("features: " + ", ".join(f"{k.replace('_', ' ')} {n:,}" for k, n in kept.items()))
+    for way, distance in report.deviation.items():
+        print(f"deviation {way.replace('_', ' ')}: {distance:.4g}")
+    print(
+        f"target length {report.target_length:.4g}, preset {report.preset}, "
+        f"{len(report.sweeps)} sweeps in {seconds['total']:.2f} s; {report.stop}"
+    )
+    print()
+    print(side_by_side(report.quality_before, report.quality_after))
+    print()
+    if options.timing:
+        for name, passed in seconds.items():
+            print(f"{'remesh, total' if name == 'total' else name:<31}{passed:>12.3f} s")
+        print()
+    for path in _outputs(options):
+        print(f"written: {path}")
+    if not options.output:
+        print("no mesh was written; -o FILE writes it")

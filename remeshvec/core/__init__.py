@@ -1,0 +1,1 @@
+"""What every module may import: types, compiler flags, threads, casts, formulas on scalars."""

@@ -1,0 +1,1 @@
+"""Feature curves: which edges and vertices must keep their place, and the polylines they form."""

@@ -1,0 +1,266 @@
+"""Feature curves of the reference surface as polylines: which edges follow each other, closest point.
+
+Every edge of a curve goes by one name, the smallest of its half-edges (of all sheets that share it), so
+that its two sides, and all sheets, look for a point in the same way.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.compiler import inlined, kernel
+from ..core.geometry import closest_on_segment, distance_squared
+from ..core.vocabulary import NONE, FloatArray, IndexArray
+from ..mesh.walk import ends_of, next_halfedge
+from .curves import Curves
+
+__all__ = [
+    "closest_on_curve",
+    "find_siblings",
+    "join_edges",
+    "measure_arcs",
+    "move_on_curve",
+    "name_edges",
+]
+
+
+def name_edges(
+    twin: IndexArray, edges: IndexArray, members: IndexArray, group: IndexArray, name: IndexArray
+) -> IndexArray:
+    """Give every edge on a curve one name.
+
+    Parameters
+    ----------
+    twin : (3 m,) int32
+    edges : (k,) int32
+        Half-edges on curves, in ascending order.
+    members, group : int32
+        Siblings, see `find_siblings`.
+    name : (3 m,) int32
+        Written: the smallest half-edge of the edge, ``NONE`` off curves.
+
+    Returns
+    -------
+    (j,) int32
+        The names, in ascending order.
+    """
+    name.fill(NONE)
+    other = twin[edges]
+    name[edges] = np.where(other == NONE, edges, np.minimum(edges, other))
+    if len(members):
+        smallest = np.minimum.reduceat(members, group[:-1])
+        name[members] = np.repeat(smallest, np.diff(group))
+    return edges[name[edges] == edges]
+
+
+def join_edges(
+    name: IndexArray, curves: Curves, origin: IndexArray, is_corner: NDArray[np.bool_]
+) -> IndexArray:
+    """Join the edges of curves to polylines that end at corners.
+
+    Parameters
+    ----------
+    name : (3 m,) int32
+        See `name_edges`.
+    curves : Curves
+    origin : (3 m,) int32
+    is_corner : (n,) bool
+
+    Returns
+    -------
+    beside : (2, 3 m) int32
+        At the names: the names of the neighbours at their start and their end, ``NONE`` at corners;
+        (2, 0) where there are no curves.
+    """
+    if not len(curves.edges):
+        return np.empty((2, 0), np.int32)
+    curve_neighbours = np.full((2, len(name)), NONE, np.int32)
+    names = name[curves.edges]
+    named = np.flatnonzero(names == curves.edges)
+    edges = curves.edges[named]
+    ends = is_corner[ends_of(origin, edges)]
+    for side, neighbours in enumerate((curves.before, curves.after)):
+        neighbour = neighbours[named]
+        is_open = (neighbour == NONE) | ends[side]
+        curve_neighbours[side, edges] = np.where(is_open, NONE, names[neighbour])
+    return curve_neighbours
+
+
+def measure_arcs(
+    X: FloatArray, origin: IndexArray, edges: IndexArray, curve_neighbours: IndexArray
+) -> FloatArray:
+    """Measure how far along its curve every edge lies.
+
+    Parameters
+    ----------
+    X : (n, 3) or (n, 4) float64
+    origin : (3 m,) int32
+    edges : (j,) int32
+        The names, in ascending order.
+    beside : (2, 3 m) int32
+        See `join_edges`.
+
+    Returns
+    -------
+    arcs : (3, 3 m) float64
+        At the names: arc length at the start of the edge and at its end, and that of the whole curve,
+        negative for one that ends at corners; (3, 0) where there are no curves.
+    """
+    arcs = np.zeros((3, curve_neighbours.shape[1]))
+    if curve_neighbours.shape[1]:
+        is_end = (curve_neighbours[0, edges] == NONE) | (curve_neighbours[1, edges] == NONE)
+        # Curves with ends first, from one of them; what is left is closed.
+        seeds = np.concatenate([edges[is_end], edges[~is_end]])
+        _measure_arcs(X, origin, curve_neighbours, seeds, arcs)
+    return arcs
+
+
+@kernel
+def _measure_arcs(X, origin, curve_neighbours, seeds, arcs):
+    path = np.empty(seeds.size, np.int64)
+    for seed in seeds:
+        if arcs[2, seed] != 0.0:
+            continue
+        is_open = curve_neighbours[0, seed] == NONE or curve_neighbours[1, seed] == NONE
+        # The end of the edge by which the walk comes in.
+        end = 0 if curve_neighbours[0, seed] == NONE or not is_open else 1
+        h = np.int64(seed)
+        total = 0.0
+        count = 0
+        while count < path.size:
+            path[count] = h
+            count += 1
+            a = origin[h]
+            b = origin[next_halfedge(h)]
+            arcs[end, h] = total
+            total += np.sqrt(distance_squared(X, a, b))
+            arcs[1 - end, h] = total
+            after = np.int64(curve_neighbours[1 - end, h])
+            if after == NONE or after == seed:
+                break
+            if curve_neighbours[0, after] != curve_neighbours[1, after]:
+                end = 0 if curve_neighbours[0, after] == h else 1
+            else:  # two edges between the same ends
+                end = 0 if _shares(X, origin[after], b if end == 0 else a) else 1
+            h = after
+        for i in range(count):
+            arcs[2, path[i]] = -total if is_open else total
+
+
+@inlined
+def _shares(X, v, w):
+    """Tell whether two vertices lie in the same place: sheets have copies of their own."""
+    return X[v, 0] == X[w, 0] and X[v, 1] == X[w, 1] and X[v, 2] == X[w, 2]
+
+
+def find_siblings(
+    X: FloatArray, origin: IndexArray, candidates: IndexArray
+) -> tuple[IndexArray, IndexArray]:
+    """Group half-edges whose two ends lie in the same places, bit for bit.
+
+    Parameters
+    ----------
+    X : (n, 3) or (n, 4) float64
+    origin : (3 m,) int32
+    candidates : (k,) int32
+        Half-edges.
+
+    Returns
+    -------
+    members : (j,) int32
+        Half-edges that have siblings, those of a group together and in ascending order.
+    group : (g + 1,) int32
+        Where the groups start.
+    """
+    members, group = np.empty(0, np.int32), np.zeros(1, np.int32)
+    if not len(candidates):
+        return members, group
+    ends = ends_of(origin, candidates)
+    if not _may_share(X, ends):
+        return members, group
+    vertices, place = np.unique(ends, return_inverse=True)
+    place = place.reshape(2, -1)
+    _, same = np.unique(X[vertices, :3] + 0.0, axis=0, return_inverse=True)  # no -0.0
+    key = np.sort(same.reshape(-1)[place], axis=0)
+    order = np.lexsort((candidates, key[1], key[0]))
+    key = key[:, order]
+    starts = np.flatnonzero(np.r_[True, (key[:, 1:] != key[:, :-1]).any(axis=0)])
+    sizes = np.diff(np.r_[starts, len(order)])
+    is_shared = np.repeat(sizes > 1, sizes)
+    group = np.r_[0, np.cumsum(sizes[sizes > 1])].astype(np.int32)
+    return candidates[order][is_shared].astype(np.int32), group
+
+
+def _may_share(X: FloatArray, ends: IndexArray) -> bool:
+    """Tell whether two edges may have their ends (2, k) in the same places: by the sum of both.
+
+    Most open meshes have no siblings, and this is an eighth of the work.
+    """
+    x, y, z = (X[ends[0], :3] + X[ends[1], :3]).T
+    key = np.sort(x + 2.0**0.5 * y + 3.0**0.5 * z)
+    return bool((key[1:] == key[:-1]).any())
+
+
+@inlined
+def closest_on_curve(X, origin, curve_neighbours, start, x, y, z):
+    """Closest point of a curve near edge ``start``: edge, parameter, distance squared.
+
+    Searched are the edges within three times the distance to ``start`` along the curve, on both
+    sides: a vertex stays on its own stretch where another comes close.
+    """
+    a = origin[start]
+    b = origin[next_halfedge(start)]
+    best = start
+    s, distance = closest_on_segment(x, y, z, X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2])
+    reach = 3.0 * np.sqrt(distance)
+    for side in range(2 if curve_neighbours.shape[1] > 0 else 0):
+        before = start
+        h = np.int64(curve_neighbours[side, start])
+        walked = 0.0
+        for _ in range(curve_neighbours.shape[1]):
+            if walked > reach or h == start or h == NONE:
+                break
+            a = origin[h]
+            b = origin[next_halfedge(h)]
+            r, d = closest_on_segment(x, y, z, X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2])
+            if d < distance:
+                best, s, distance = h, r, d
+            walked += np.sqrt(
+                (X[a, 0] - X[b, 0]) ** 2 + (X[a, 1] - X[b, 1]) ** 2 + (X[a, 2] - X[b, 2]) ** 2
+            )
+            after = np.int64(curve_neighbours[0, h])
+            if after == before:
+                after = np.int64(curve_neighbours[1, h])
+            before, h = h, after
+    return best, s, distance
+
+
+@inlined
+def move_on_curve(curve_neighbours, arcs, edge, arc):
+    """Go along a curve from an edge to an arc length; returns the edge and the parameter there."""
+    h = np.int64(edge)
+    total = arcs[2, h]
+    if total < 0.0:
+        arc = min(max(arc, 0.0), -total)
+    elif arc < 0.0:
+        arc += total
+    elif arc > total:
+        arc -= total
+    for _ in range(curve_neighbours.shape[1]):
+        low = min(arcs[0, h], arcs[1, h])
+        high = max(arcs[0, h], arcs[1, h])
+        if low <= arc <= high:
+            break
+        # Towards the arc; on a closed curve the shorter way around.
+        ahead = arc > high
+        if total > 0.0 and abs(arc - 0.5 * (low + high)) > 0.5 * total:
+            ahead = not ahead
+        end = 1 if (arcs[1, h] > arcs[0, h]) == ahead else 0
+        after = np.int64(curve_neighbours[end, h])
+        if after == NONE:
+            break
+        h = after
+    length = arcs[1, h] - arcs[0, h]
+    s = (arc - arcs[0, h]) / length if length != 0.0 else 0.0
+    return h, min(max(s, 0.0), 1.0)

@@ -1,0 +1,1 @@
+"""Mesh files: guarded, read, and written whole or not at all."""

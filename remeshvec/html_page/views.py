@@ -1,0 +1,164 @@
+"""What the 3D views of the HTML page draw: small arrays, colours of faces, and the first camera."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..measures.quality import Elements, Quality
+from ..viz.pictures import UP, Camera, three_quarter_view
+
+__all__ = ["COLOURINGS", "MOST_EDGED", "MOST_FACES", "Views", "build_views"]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+# At these limits Chromium draws a page within 4 to 7 seconds on two cores without a graphics card, and
+# the page has 16 MB.
+MOST_FACES = 200_000  # of a mesh
+MOST_EDGED = 50_000  # faces with edges drawn, and of the part that is shown of a larger mesh
+
+# Red to blue [ColorBrewer, RdYlBu] and brown to green [BrBG]: told apart by the colour-blind too.
+_SHAPE_COLOURS = ("#7d0a1e", "#c8282c", "#ee6a43", "#fbb165", "#fdebb0", "#cfe6f0", "#8dbfdd")
+_AREA_COLOURS = ("#7a4a0c", "#c9964a", "#f0dcae", "#f4f4f2", "#b9e2da", "#4fa99c", "#0a5c54")
+
+COLOURINGS: tuple[dict[str, Any], ...] = (
+    {
+        "key": "shape",
+        "name": "shape",
+        "title": "2 × inradius / circumradius: 1 is equilateral, 0 has no area",
+        "colours": _SHAPE_COLOURS,
+        "ticks": ("0", "0.25", "0.5", "0.75", "1"),
+    },
+    {
+        "key": "angle",
+        "name": "smallest angle",
+        "title": "smallest angle of the triangle: 60° is equilateral",
+        "colours": _SHAPE_COLOURS,
+        "ticks": ("0°", "15°", "30°", "45°", "60°"),
+    },
+    {
+        "key": "area",
+        "name": "area",
+        "title": "area, as a multiple of that of an equilateral triangle with edges L",
+        "colours": _AREA_COLOURS,
+        "ticks": ("¼ and less", "½", "1", "2", "4 and more"),
+    },
+)
+
+
+class Views(NamedTuple):
+    """The scene, and what must be said about it."""
+
+    scene: dict[str, Any]  # JSON-ready
+    notes: list[str]
+
+
+def build_views(
+    meshes: tuple[Elements, Elements], qualities: tuple[Quality, Quality], length: float, up: str
+) -> Views:
+    """Make the scene of two meshes under one camera.
+
+    Parameters
+    ----------
+    meshes : (Elements, Elements)
+        Before and after.
+    qualities : (Quality, Quality)
+        Measures of the same meshes, whose volumes tell where outside is.
+    length : float
+        The target length L that areas are compared with.
+    up : {"y", "z"}
+        Axis that points up.
+
+    Returns
+    -------
+    Views
+        Coordinates are relative to the middle of what is shown and at most 1 from it, float32: so
+        neither size nor place costs digits.
+    """
+    camera = three_quarter_view(meshes[0].V, meshes[0].F, UP[up])
+    shown = _shown_faces(meshes, camera)
+    corners = [
+        mesh.V[mesh.F[kept]].reshape(-1, 3) for mesh, kept in zip(meshes, shown, strict=True)
+    ]
+    middle = _middle(np.concatenate(corners))
+    reach = max(float(np.linalg.norm(P - middle, axis=1).max(initial=0)) for P in corners) or 1.0
+    faces = max(map(len, shown))
+    scene = {
+        "meshes": [
+            {**_mesh(mesh, kept, middle, reach, length), "sides": _sides(quality)}
+            for mesh, kept, quality in zip(meshes, shown, qualities, strict=True)
+        ],
+        "camera": {
+            "eye": camera.eye.tolist(),
+            "right": camera.right.tolist(),
+            "up": camera.up.tolist(),
+        },
+        "edges": faces <= MOST_EDGED,
+        "colourings": COLOURINGS,
+    }
+    return Views(scene, _notes(meshes, shown, faces <= MOST_EDGED))
+
+
+def _shown_faces(meshes: tuple[Elements, Elements], camera: Camera) -> list[IntArray]:
+    """Choose the faces that are shown: all, or those around the point that is nearest to the eye."""
+    if max(len(mesh.F) for mesh in meshes) <= MOST_FACES:
+        return [np.arange(len(mesh.F)) for mesh in meshes]
+    first = meshes[0].V[meshes[0].F].mean(axis=1)
+    near = first[np.argmax(first @ camera.eye)]
+    distances = [np.linalg.norm(mesh.V[mesh.F].mean(axis=1) - near, axis=1) for mesh in meshes]
+    radius = min(np.sort(d)[MOST_EDGED] for d in distances if len(d) > MOST_EDGED)
+    return [np.flatnonzero(d < radius) for d in distances]
+
+
+def _middle(points: FloatArray) -> FloatArray:
+    return (points.min(axis=0) + points.max(axis=0)) / 2 if len(points) else np.zeros(3)
+
+
+def _mesh(
+    mesh: Elements, kept: IntArray, middle: FloatArray, reach: float, length: float
+) -> dict[str, Any]:
+    """Return one mesh in base64: coordinates, indices, and a byte a face for each colouring."""
+    used, F = np.unique(mesh.F[kept], return_inverse=True)
+    with np.errstate(divide="ignore"):  # no area: as small as can be shown
+        doublings = np.log2(mesh.areas[kept] / (np.sqrt(3) / 4 * length**2))
+    levels = {
+        "shape": mesh.radius_ratios[kept],
+        "angle": mesh.angles[kept].min(axis=1, initial=60.0) / 60,
+        "area": (doublings + 2) / 4,
+    }
+    return {
+        "vertices": _packed((mesh.V[used] - middle) / reach, "<f4"),
+        "faces": _packed(F, "<u4"),
+        "levels": {
+            name: _packed(np.rint(255 * np.clip(level, 0, 1)), "u1")
+            for name, level in levels.items()
+        },
+    }
+
+
+def _sides(quality: Quality) -> list[int]:
+    """Return the sides that edges are drawn on: that of the normals 1, the other -1."""
+    if quality.volume is None:
+        return [1, -1]
+    return [1] if quality.volume >= 0 else [-1]
+
+
+def _packed(array: NDArray[Any], dtype: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(array.astype(dtype)).tobytes()).decode("ascii")
+
+
+def _notes(meshes: tuple[Elements, Elements], shown: list[IntArray], with_edges: bool) -> list[str]:
+    notes = []
+    if any(len(kept) < len(mesh.F) for mesh, kept in zip(meshes, shown, strict=True)):
+        notes.append(
+            f"The views show a part of the surface, {len(shown[0]):,} faces before and "
+            f"{len(shown[1]):,} after, so that browsers can turn it; all numbers and histograms are of "
+            "the whole."
+        )
+    if not with_edges:
+        notes.append(f"Edges are left out, since more than {MOST_EDGED:,} faces are shown.")
+    return notes

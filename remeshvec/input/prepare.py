@@ -1,0 +1,191 @@
+"""From the caller's arrays to a clean, ordered, connected mesh."""
+
+from __future__ import annotations
+
+from math import floor, isfinite, log2
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.vocabulary import NONE, FloatArray, IndexArray, Mesh
+from ..errors import MeshInputError
+from ..mesh.halfedge import build_mesh
+from ..mesh.morton import MeshFrame, order_mesh, survey
+from ..mesh.orient import orient_faces
+from ..mesh.repair import count_used, drop_degenerate_faces, drop_duplicate_faces, weld_points
+from ..mesh.twins import Defects
+from ..mesh.walk import ends_of
+
+__all__ = ["Prepared", "prepare"]
+
+
+class Prepared(NamedTuple):
+    """A mesh ready for the sweeps, in a frame of its own: ``(V - centre) * scale``."""
+
+    mesh: Mesh
+    face_source: NDArray[Any]  # (m,) int, input face of every face
+    vertex_source: IndexArray  # (n,) input vertex of every vertex
+    representative: IndexArray | None  # (n_in,) the input vertex that stands for each; None: itself
+    flipped: NDArray[np.bool_] | None  # (m_in,) input faces whose corners 1 and 2 were swapped
+    centre: FloatArray  # (3,)
+    scale: float  # power of two
+    dirt: dict[str, int]
+
+
+def prepare(V: FloatArray, F: NDArray[Any], parallel: bool) -> Prepared:
+    """Clean, orient, order and connect the input.
+
+    Degenerate and duplicate faces go, vertices of the same place are welded where both lie on a
+    boundary (closed parts that touch stay apart), faces are turned to the winding of their
+    neighbours, edges that no manifold has are cut.
+
+    Parameters
+    ----------
+    V : (n, 3) float64
+        Finite where faces use them.
+    F : (m, 3) int
+        Indices in range.
+    parallel : bool
+        Let threads share the work; the result is the same.
+    """
+    # Kernels would be compiled once more for arrays that are read-only or not aligned.
+    V, F = (array if array.flags.behaved else array.copy() for array in (V, F))
+    F32, low, high, n_repeated = survey(V, F, parallel)
+    frame = _make_frame(low, high)
+    faces = _RemainingFaces(F32)
+    if n_repeated:
+        faces.note("unreferenced_vertices", len(V) - count_used(faces.F, len(V)))
+        faces.keep(drop_degenerate_faces(faces.F), "degenerate_faces")
+    mesh = _connect(V, faces, frame, parallel)
+    if not n_repeated:
+        faces.note("unreferenced_vertices", len(V) - mesh.n_used)
+    mesh = _drop_duplicates(mesh, V, faces, frame, parallel)
+    representative = _weld_boundary(mesh, V, frame)
+    if representative is not None:
+        faces.note("welded_vertices", int((representative != np.arange(len(V))).sum()))
+        faces.F = representative[faces.F]
+        faces.keep(drop_degenerate_faces(faces.F), "degenerate_faces")
+        mesh = _connect(V, faces, frame, parallel)
+        mesh = _drop_duplicates(mesh, V, faces, frame, parallel)
+    flipped = None
+    if mesh.found.inconsistent_edges or mesh.found.non_manifold_edges:
+        faces.F, turned = orient_faces(faces.F, len(V))
+        if turned.any():
+            faces.note("flipped_faces", int(turned.sum()))
+            flipped = np.zeros(len(F), np.bool_)
+            flipped[turned if faces.source is None else faces.source[turned]] = True
+            mesh = _connect(V, faces, frame, parallel)
+    faces.note("non_manifold_edges", mesh.found.non_manifold_edges)
+    faces.note("inconsistent_edges", mesh.found.inconsistent_edges)
+    if mesh.found.pinched_vertices:
+        faces.note("pinched_vertices", _count_pinched(mesh))
+    face_source = mesh.face_source
+    if faces.source is not None:
+        face_source = faces.source[face_source]
+    return Prepared(
+        mesh.mesh, face_source, mesh.vertex_source, representative, flipped, frame.centre, frame.scale,
+        faces.dirt,
+    )  # fmt: skip
+
+
+class _RemainingFaces:
+    """The faces that are left of the input, and what was found on the way."""
+
+    def __init__(self, F: IndexArray) -> None:
+        self.F = F
+        self.source: IndexArray | None = None  # (m,) input face of each; None: itself
+        self.dirt: dict[str, int] = {}
+
+    def keep(self, kept: NDArray[np.intp] | None, name: str) -> None:
+        """Keep some faces, or all, and say why."""
+        if kept is None:
+            return
+        self.note(name, len(self.F) - len(kept))
+        self.F = self.F[kept]
+        self.source = kept.astype(np.int32) if self.source is None else self.source[kept]
+
+    def note(self, name: str, count: int) -> None:
+        """Count dirt."""
+        if count:
+            self.dirt[name] = self.dirt.get(name, 0) + count
+
+
+class _Connected(NamedTuple):
+    mesh: Mesh
+    face_source: IndexArray
+    vertex_source: IndexArray
+    n_used: int  # vertices that faces use
+    found: Defects
+
+
+def _connect(V: FloatArray, faces: _RemainingFaces, frame: MeshFrame, parallel: bool) -> _Connected:
+    if not len(faces.F):
+        raise MeshInputError("no face of F has three different corners")
+    ordered = order_mesh(V, faces.F, parallel, frame)
+    mesh, found, source = build_mesh(ordered.X, ordered.F, parallel, owned=True)
+    vertex_source = ordered.vertex_source
+    if len(source) > len(vertex_source):
+        vertex_source = vertex_source[source]
+    return _Connected(mesh, ordered.face_source, vertex_source, len(ordered.X), found)
+
+
+def _drop_duplicates(
+    connected: _Connected, V: FloatArray, faces: _RemainingFaces, frame: MeshFrame, parallel: bool
+) -> _Connected:
+    """Drop duplicate faces, if any, and connect the others."""
+    found = connected.found
+    if not (found.non_manifold_edges or found.inconsistent_edges or found.doubled_faces):
+        return connected
+    kept = drop_duplicate_faces(faces.F, connected.face_source[_may_be_double(connected.mesh.twin)])
+    if kept is None:
+        return connected
+    faces.keep(kept, "duplicate_faces")
+    return _connect(V, faces, frame, parallel)
+
+
+def _may_be_double(twin: IndexArray) -> NDArray[np.bool_]:
+    """Faces without two different neighbours: the edges of duplicates are cut or join the two."""
+    a, b, c = (twin.reshape(-1, 3) // 3).T
+    most = np.maximum(np.maximum(a, b), c)
+    return ((a == most) | (a < 0)) & ((b == most) | (b < 0)) & ((c == most) | (c < 0))
+
+
+def _weld_boundary(connected: _Connected, V: FloatArray, frame: MeshFrame) -> IndexArray | None:
+    """Map vertices of the boundary in one place to one of them; None where there are none."""
+    on_boundary = np.flatnonzero(connected.mesh.kind)
+    if not len(on_boundary):
+        return None
+    candidates = np.unique(connected.vertex_source[on_boundary])
+    points = (V[candidates] - frame.centre) * frame.scale
+    return weld_points(points, candidates, len(V))
+
+
+def _count_pinched(connected: _Connected) -> int:
+    """Count vertices that hold several fans, but for the ends of edges that were cut."""
+    mesh, source, found = connected.mesh, connected.vertex_source, connected.found
+    pinched = np.unique(source[connected.n_used :])
+    if found.non_manifold_edges or found.inconsistent_edges:
+        h = np.flatnonzero(mesh.twin == NONE)
+        ends = np.sort(source[ends_of(mesh.origin, h)], axis=0)
+        edges, count = np.unique(ends, axis=1, return_counts=True)
+        pinched = np.setdiff1d(pinched, edges[:, count > 1])
+    return len(pinched)
+
+
+def _make_frame(low: FloatArray, high: FloatArray) -> MeshFrame:
+    """Scale to an extent of 1 to 2 and, far from the origin, centre.
+
+    A power of two changes no bit of a mantissa, so the frame costs no precision; it keeps squares
+    of squares of lengths in range for any unit.
+    """
+    corners = list(zip(low.tolist(), high.tolist(), strict=True))
+    extent = max(b - a for a, b in corners)
+    if not extent > 0.0:
+        raise MeshInputError("all vertices of V lie in one place: there is no surface to remesh")
+    if not isfinite(extent):
+        raise MeshInputError("the extent of V exceeds the range of float64; scale it down")
+    middle = [0.5 * a + 0.5 * b for a, b in corners]
+    is_far = max(abs(x) for x in middle) > 4.0 * extent
+    centre = np.array(middle) if is_far else np.zeros(3)
+    return MeshFrame(low, high, centre, 2.0 ** min(1000, -floor(log2(extent))))

@@ -1,0 +1,179 @@
+"""A mesh with the data it carries, on its way from an object or a file through `remesh` and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Data", "MeshData", "carry", "corner_values", "split_vertices"]
+
+Data = dict[str, NDArray[Any]]
+
+# Numbers on corners of one vertex that differ by less than this share of their range are one number.
+_SAME_DATA = 1e-6
+
+
+@dataclass
+class MeshData:
+    """Arrays of a mesh and of what it carries.
+
+    Attributes
+    ----------
+    V : (n, 3)
+    F : (m, 3)
+    on_vertices, on_faces, on_corners : dict of arrays
+        By name: (n, ...), (m, ...), (m, 3, ...).
+    feature_data : tuple of str
+        Names of data whose jumps, or borders, are to be kept: texture coordinates, groups.
+    directions : tuple of str
+        Names of data on vertices that are unit vectors.
+    wrap : callable, optional
+        Makes an object of the kind that this was read from.
+    extra : dict
+        What readers and writers of files tell each other besides: textures, materials.
+    """
+
+    V: NDArray[Any]
+    F: NDArray[Any]
+    on_vertices: Data = field(default_factory=dict)
+    on_faces: Data = field(default_factory=dict)
+    on_corners: Data = field(default_factory=dict)
+    feature_data: tuple[str, ...] = ()
+    directions: tuple[str, ...] = ()
+    wrap: Callable[[MeshData], Any] | None = None
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    def preserved(self, requested: Any = None) -> list[Any] | None:
+        """Return the data to be kept, and what is asked for besides, as ``remesh`` takes them."""
+        several = (
+            requested
+            if isinstance(requested, list | tuple)
+            else []
+            if requested is None
+            else [requested]
+        )
+        return [*map(self.find, self.feature_data), *several] or None
+
+    def find(self, name: str) -> NDArray[Any]:
+        """Return data on faces or corners by name; those on vertices as their corners have them."""
+        for data in (self.on_faces, self.on_corners):
+            if name in data:
+                return data[name]
+        return corner_values(self.on_vertices[name], self.F)
+
+
+def corner_values(values: NDArray[Any], F: NDArray[Any]) -> NDArray[Any]:
+    """Spread data on vertices (n, ...) to corners (m, 3, ...)."""
+    return np.asarray(values)[F]
+
+
+def carry(data: MeshData, result: Any) -> MeshData:
+    """Bring all data of a mesh over to the result of ``remesh``.
+
+    Where vertices lay in one place with different data, as at the seams of a texture, the new vertices
+    on the same curves are doubled.
+    """
+    F = np.asarray(result.F)
+    out = replace(
+        data,
+        V=np.asarray(result.V),
+        F=F,
+        on_vertices={},
+        on_faces={k: result.transfer(x, on="faces") for k, x in data.on_faces.items()},
+        on_corners={
+            k: result.transfer(x, on="corners", method=_method(x))
+            for k, x in data.on_corners.items()
+        },
+    )
+    welded = result.report.dirt.get("welded_vertices", 0)
+    if welded and data.on_vertices:
+        at_corners = {
+            k: result.transfer(corner_values(x, data.F), on="corners", method=_method(x))
+            for k, x in data.on_vertices.items()
+        }
+        vertex_of, out.F = split_vertices(F, list(at_corners.values()))
+        out.V = out.V[F.ravel()[vertex_of]]
+        out.on_vertices = {k: x.reshape(-1, *x.shape[2:])[vertex_of] for k, x in at_corners.items()}
+    else:
+        out.on_vertices = {
+            k: result.transfer(x, method=_method(x)) for k, x in data.on_vertices.items()
+        }
+    for name in data.directions:
+        out.on_vertices[name] = _unit_rows(out.on_vertices[name])
+    return out
+
+
+def split_vertices(
+    F: NDArray[Any], at_corners: list[NDArray[Any]]
+) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Give corners of one vertex a vertex each where their data differ.
+
+    Parameters
+    ----------
+    F : (m, 3) int
+    at_corners : list of (m, 3, ...)
+
+    Returns
+    -------
+    corner : (k,) int64
+        For every new vertex one of its corners ``3 * face + c``.
+    F : (m, 3)
+        Faces of the new vertices, in the dtype of the old.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    h = np.arange(F.size)
+    after = h + 1 - 3 * (h % 3 == 2)
+    ends = np.stack([F.ravel(), F.ravel()[after]])
+    # Half-edges of the same edge follow each other; corners at both of its ends are compared.
+    order = np.lexsort((*np.sort(ends, axis=0),))
+    one, two = order[:-1], order[1:]
+    same_edge = (np.sort(ends[:, one], axis=0) == np.sort(ends[:, two], axis=0)).all(axis=0)
+    one, two = one[same_edge], two[same_edge]
+    turned = F.ravel()[one] != F.ravel()[two]
+    pairs = np.concatenate(
+        [
+            np.stack([one, np.where(turned, after[two], two)]),
+            np.stack([after[one], np.where(turned, two, after[two])]),
+        ],
+        axis=1,
+    )
+    joined = np.ones(pairs.shape[1], np.bool_)
+    for values in at_corners:
+        joined &= _data_agree(values.reshape(F.size, -1), *pairs)
+    a, b = pairs[:, joined]
+    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(F.size, F.size))
+    _, label = connected_components(graph, directed=False)
+    # New vertices in the order of the old ones.
+    _, corner = np.unique(label, return_index=True)
+    corner = corner[np.lexsort((corner, F.ravel()[corner]))]
+    number = np.empty(len(corner), np.int64)
+    number[label[corner]] = np.arange(len(corner))
+    return corner, number[label].reshape(F.shape).astype(F.dtype)
+
+
+def _data_agree(values: NDArray[Any], one: NDArray[Any], two: NDArray[Any]) -> NDArray[np.bool_]:
+    if values.dtype.kind not in "fc":
+        return np.asarray((values[one] == values[two]).all(axis=1))
+    near = _SAME_DATA * np.ptp(values) if np.isfinite(values).all() else 0.0
+    with np.errstate(invalid="ignore"):
+        is_near = abs(values[one] - values[two]) <= near
+    return np.asarray(
+        (is_near | ((values[one] != values[one]) & (values[two] != values[two]))).all(1)
+    )
+
+
+def _method(values: NDArray[Any]) -> str:
+    """Colours in bytes are mixed; other whole numbers are labels."""
+    is_colour = values.dtype.kind == "u" and values.ndim == 2 and values.shape[1] in (3, 4)
+    return "linear" if is_colour else "auto"
+
+
+def _unit_rows(values: NDArray[Any]) -> NDArray[Any]:
+    length = np.linalg.norm(values, axis=1, keepdims=True)
+    return np.asarray(values / np.where(length > 0.0, length, 1.0), values.dtype)

@@ -1,0 +1,122 @@
+"""Meshes of meshio: blocks of cells, with data by block."""
+
+from __future__ import annotations
+
+import warnings
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MeshInputError
+from .mesh_data import Data, MeshData
+
+__all__ = ["is_meshio", "read_meshio", "write_meshio"]
+
+# Cells that surfaces consist of, and those that lie on surfaces and are left out.
+_FACE_CELLS = ("triangle", "quad", "polygon")
+_LOWER = ("vertex", "line")
+
+# Names of cell data by which programs name parts of a mesh.
+GROUPS = ("gmsh:physical", "gmsh:geometrical", "medit:ref", "cell_tags", "group", "material")
+
+_BLOCK, _SET = "meshio:block", "meshio:set:"
+
+
+def is_meshio(value: Any) -> bool:
+    """Tell a ``meshio.Mesh`` by what it has."""
+    return all(hasattr(value, name) for name in ("points", "cells", "point_data", "cell_data"))
+
+
+def read_meshio(mesh: Any) -> MeshData:
+    """Read a ``meshio.Mesh`` of triangles, quadrilaterals or polygons, in the plane or in space.
+
+    Cell data, cell sets and blocks come over; borders between blocks, sets, and groups of the names
+    that mesh generators use are kept.
+    """
+    blocks = [(i, block) for i, block in enumerate(mesh.cells) if block.type in _FACE_CELLS]
+    _check_blocks(mesh, blocks)
+    F, cell, source = [], [], []
+    for i, block in blocks:
+        faces, of = _triangles(
+            np.asarray(block.data, dtype=object if block.type == "polygon" else None)
+        )
+        F.append(faces)
+        cell.append(of)
+        source.append(np.full(len(faces), i))
+    on_faces: Data = {}
+    for name, values in mesh.cell_data.items():
+        parts = [np.asarray(values[i])[of] for (i, _), of in zip(blocks, cell, strict=True)]
+        on_faces[name] = np.concatenate(parts)
+    for name, members in mesh.cell_sets.items():
+        parts = [np.isin(of, members[i]) for (i, _), of in zip(blocks, cell, strict=True)]
+        on_faces[_SET + name] = np.concatenate(parts)
+    if len(blocks) > 1:
+        on_faces[_BLOCK] = np.concatenate(source)
+    V = np.asarray(mesh.points)
+    is_plane = V.ndim == 2 and V.shape[1] == 2
+    if is_plane:
+        V = np.column_stack([V, np.zeros(len(V), V.dtype)])
+    feature_data = [name for name in on_faces if name in (*GROUPS, _BLOCK) or name.startswith(_SET)]
+    on_points = {name: np.asarray(values) for name, values in mesh.point_data.items()}
+    return MeshData(
+        V, np.concatenate(F), on_points, on_faces, {}, tuple(feature_data), (),
+        partial(_to_meshio, mesh, is_plane),
+    )  # fmt: skip
+
+
+def _check_blocks(mesh: Any, blocks: list[Any]) -> None:
+    kinds = {block.type for block in mesh.cells}
+    solid = kinds - {*_FACE_CELLS, *_LOWER}
+    if solid or not blocks:
+        raise MeshInputError(
+            f"the meshio mesh has cells of type {', '.join(sorted(kinds)) or '(none)'}; a surface of "
+            "triangles, quads or polygons is needed, such as the boundary of a solid"
+        )
+    left_out = [*(kinds & set(_LOWER)), *(["point sets"] if mesh.point_sets else [])]
+    if left_out:
+        warnings.warn(f"{', '.join(sorted(left_out))} are not remeshed and left out", stacklevel=6)
+
+
+def _triangles(cells: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Cut cells into fans; returns the triangles and the cell of each."""
+    if cells.dtype != object and cells.shape[1] == 3:
+        return cells.astype(np.int64), np.arange(len(cells))
+    fans = [
+        (polygon[0], polygon[k], polygon[k + 1], i)
+        for i, polygon in enumerate(cells)
+        for k in range(1, len(polygon) - 1)
+    ]
+    table = np.array(fans, dtype=np.int64).reshape(-1, 4)
+    return table[:, :3], table[:, 3]
+
+
+def _to_meshio(mesh: Any, is_plane: bool, data: MeshData) -> Any:
+    return write_meshio(type(mesh), data, is_plane, dict(mesh.field_data))
+
+
+def write_meshio(
+    mesh_type: Any, data: MeshData, is_plane: bool = False, field_data: Any = None
+) -> Any:
+    """Make a ``meshio.Mesh``; blocks and sets come from data of their names."""
+    F, on_faces = data.F, dict(data.on_faces)
+    block = on_faces.pop(_BLOCK, np.zeros(len(F), np.int64))
+    members = [np.flatnonzero(block == b) for b in np.unique(block)]
+    sets = _sets(on_faces, members)
+    return mesh_type(
+        data.V[:, :2] if is_plane else data.V,
+        [("triangle", F[rows]) for rows in members],
+        point_data=data.on_vertices,
+        cell_data={name: [x[rows] for rows in members] for name, x in on_faces.items()},
+        field_data=field_data,
+        cell_sets=sets,
+    )
+
+
+def _sets(on_faces: Data, members: list[NDArray[Any]]) -> dict[str, list[NDArray[Any]]]:
+    sets = {}
+    for name in [name for name in on_faces if name.startswith(_SET)]:
+        mask = on_faces.pop(name)
+        sets[name.removeprefix(_SET)] = [np.flatnonzero(mask[rows]) for rows in members]
+    return sets

@@ -1,0 +1,1 @@
+"""Numbers about meshes: quality, and the distance of two surfaces."""

@@ -1,0 +1,34 @@
+"""Steps from half-edge to half-edge, and the ends of edges."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.compiler import inlined
+
+__all__ = ["edge_keys", "ends_of", "next_halfedge", "previous_halfedge"]
+
+
+@inlined
+def next_halfedge(h):
+    """Return the next half-edge of the same face."""
+    return h + 1 - 3 * np.int64(np.uint64(h) % np.uint64(3) == np.uint64(2))
+
+
+@inlined
+def previous_halfedge(h):
+    """Return the previous half-edge of the same face."""
+    return h - 1 + 3 * np.int64(np.uint64(h) % np.uint64(3) == np.uint64(0))
+
+
+def ends_of(origin: NDArray[Any], h: NDArray[Any]) -> NDArray[Any]:
+    """Return the vertices where half-edges start and end, (2, k), from their numbers (k,)."""
+    return origin[np.stack([h, h - h % 3 + (h + 1) % 3])]
+
+
+def edge_keys(ends: NDArray[Any], n: int) -> NDArray[np.int64]:
+    """One number an edge, whichever way it runs, from its ends (2, ...) among n vertices."""
+    return np.minimum(*ends).astype(np.int64) * n + np.maximum(*ends)

@@ -1,0 +1,1 @@
+"""What a surface is remeshed for: Laplacians, fairing, editing, smoothing."""

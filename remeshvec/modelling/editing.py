@@ -1,0 +1,177 @@
+"""Edit a surface by a handle: displacements solve ``Delta^k d = 0`` between handle and fixed parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.check import as_array, as_mask, as_mesh, which
+from ..core.vocabulary import FloatArray
+from ..errors import OptionError
+from .fairing import Polyharmonic
+from .laplacians import Area
+
+__all__ = ["Editor", "Transform", "as_transform", "deform", "split_vertices"]
+
+Transform = ArrayLike | Callable[[FloatArray], ArrayLike]
+
+
+def deform(
+    V: ArrayLike,
+    F: ArrayLike,
+    handle: ArrayLike,
+    fixed: ArrayLike,
+    transform: Transform,
+    k: int = 2,
+    *,
+    area: Area = "voronoi",
+) -> FloatArray:
+    """Move a handle, hold some vertices, and let the others follow smoothly.
+
+    One `Editor` and one `Editor.move`; see there.
+
+    Returns
+    -------
+    (n, 3) float64
+        Vertices.
+    """
+    return Editor(V, F, handle, fixed, k, area=area).move(transform)
+
+
+class Editor:
+    """Deform a surface again and again with the same handle: the system is factored once.
+
+    The displacement d of the support, which is all that is neither handle nor fixed, solves ``Delta^k d
+    = 0`` [Botsch and Kobbelt 2004, An intuitive framework for real-time freeform modeling, sections 3
+    and 4]. Where handle and fixed part are k rings wide, the surface stays smooth of order k - 1 across
+    their borders. Displacements are added in space: details of the surface are carried along but do not
+    turn with it; `MultiresolutionEditor` turns them.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+    F : (m, 3) int
+    handle, fixed : (k,) int or (n,) bool
+        Vertices that are moved, and vertices that stay. They must not overlap.
+    k : {1, 2, 3}
+        1: membrane, 2: thin plate, 3: minimal variation of curvature.
+    area : {"voronoi", "uniform"}
+        See `vertex_areas`.
+
+    Attributes
+    ----------
+    V : (n, 3) float64
+        The surface at rest.
+    handle, fixed, support : (n,) bool
+
+    Raises
+    ------
+    MeshInputError
+        V and F are no mesh, or faces of the support have no area.
+    OptionError
+        Handle and fixed part overlap, leave nothing between them, or do not exist.
+    SingularSystemError
+        A component of the mesh has neither handle nor fixed vertices.
+
+    Examples
+    --------
+    >>> editor = Editor(V, F, handle, fixed, k=2)  # doctest: +SKIP
+    >>> for step in range(100):  # doctest: +SKIP
+    ...     show(editor.move(rotation(step)), F)
+    """
+
+    def __init__(
+        self,
+        V: ArrayLike,
+        F: ArrayLike,
+        handle: ArrayLike,
+        fixed: ArrayLike,
+        k: int = 2,
+        *,
+        area: Area = "voronoi",
+    ) -> None:
+        vertices, faces = as_mesh(V, F)
+        self.V = vertices.copy()
+        self.handle, self.fixed, self.support = split_vertices(len(vertices), faces, handle, fixed)
+        self._system = Polyharmonic(self.V, faces, self.support, k, area)
+        self._basis: FloatArray | None = None
+
+    def move(self, transform: Transform) -> FloatArray:
+        """Return the surface with its handle moved from where it is at rest.
+
+        Parameters
+        ----------
+        transform : (4, 4) or (3, 4) float, (h, 3) float, or callable
+            An affine map as a matrix for column vectors; or the new positions of the handle's vertices,
+            in the order of their indices; or a function from the old ones (h, 3) to these. After the
+            first of them, affine maps need no solve: they are linear in four solutions [the same,
+            section 4].
+
+        Returns
+        -------
+        (n, 3) float64
+            Vertices; fixed ones are those of ``V``, bit for bit.
+        """
+        affine, target = as_transform(transform, self.V[self.handle])
+        if affine is None:
+            d = np.zeros_like(self.V)
+            d[self.handle] = target - self.V[self.handle]
+            moved = self.V + self._system.solve(d)
+        else:
+            moved = self.V + self._affine_basis() @ (affine - np.eye(3, 4)).T
+        moved[self.handle] = target
+        moved[self.fixed] = self.V[self.fixed]
+        return moved
+
+    def _affine_basis(self) -> FloatArray:
+        """Solutions (n, 4) with the handle's coordinates, and with 1, at the handle."""
+        if self._basis is None:
+            values = np.zeros((len(self.V), 4))
+            values[self.handle] = np.column_stack([self.V[self.handle], np.ones(self.handle.sum())])
+            self._basis = self._system.solve(values)
+        return self._basis
+
+
+def split_vertices(
+    n: int, F: NDArray[np.int64], handle: ArrayLike, fixed: ArrayLike
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Masks of handle, fixed part and support; vertices that no face uses count as fixed."""
+    is_handle = as_mask(handle, n, "handle", "vertex")
+    is_fixed = as_mask(fixed, n, "fixed", "vertex")
+    both = np.flatnonzero(is_handle & is_fixed)
+    if len(both):
+        raise OptionError(f"{which(both, 'vertex')} are in the handle and fixed; choose one")
+    if not is_handle.any():
+        raise OptionError("handle is empty: there is nothing to move")
+    is_fixed |= (np.bincount(F.ravel(), minlength=n) == 0) & ~is_handle
+    support = ~(is_handle | is_fixed)
+    if not support.any():
+        raise OptionError("all vertices are in the handle or fixed: none is left to follow")
+    return is_handle, is_fixed, support
+
+
+def as_transform(
+    transform: Transform, points: FloatArray
+) -> tuple[NDArray[np.float64] | None, FloatArray]:
+    """Return the affine map (3, 4), if it is one, and where it takes the points."""
+    value = transform(points.copy()) if callable(transform) else transform
+    array = as_array(value, "transform")
+    if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+        raise OptionError("transform must hold finite numbers")
+    array = array.astype(np.float64)
+    if array.shape == (4, 4) and not callable(transform):
+        if not np.array_equal(array[3], [0.0, 0.0, 0.0, 1.0]):
+            raise OptionError(
+                f"the last row of an affine transform is 0 0 0 1; got {array[3].tolist()}"
+            )
+        array = array[:3]
+    if array.shape == (3, 4) and not callable(transform):
+        return array, points @ array[:, :3].T + array[:, 3]
+    if array.shape != points.shape:
+        raise OptionError(
+            f"transform must be a (4, 4) or (3, 4) matrix, or the new positions {points.shape} of the "
+            f"handle's vertices, or a function that returns them; got shape {array.shape}"
+        )
+    return None, array

@@ -1,0 +1,130 @@
+"""Fair surfaces: ``Delta^k x = 0`` in a region, continuous of order k - 1 with what is around it."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.check import as_mask, as_mesh, positive_count, which
+from ..core.vocabulary import FloatArray
+from ..errors import OptionError
+from .laplacians import Area, cotangent_matrix, polyharmonic_matrix, vertex_areas
+from .solver import LaplacianSolver
+
+__all__ = ["Polyharmonic", "fair"]
+
+BoolArray = NDArray[np.bool_]
+
+
+def fair(
+    V: ArrayLike,
+    F: ArrayLike,
+    region: ArrayLike,
+    k: int = 2,
+    *,
+    area: Area = "voronoi",
+    iterations: int = 1,
+) -> FloatArray:
+    """Replace a region by the smoothest surface that joins what is around it.
+
+    Solves ``Delta^k x = 0`` for the vertices of the region, the k rings around it being fixed [Botsch
+    and Kobbelt 2004, An intuitive framework for real-time freeform modeling, section 3; Kobbelt et al.
+    1998]: a membrane (k = 1, joins with C0), a thin plate (2, C1), or the surface of minimal variation
+    of curvature (3, C2).
+
+    Parameters
+    ----------
+    V : (n, 3) float
+    F : (m, 3) int
+    region : (r,) int or (n,) bool
+        Vertices that move. Where it is nearer than k rings to a boundary of the mesh, the conditions
+        that are missing there are the natural ones of the energy.
+    k : {1, 2, 3}
+        Order.
+    area : {"voronoi", "uniform"}
+        See `vertex_areas`.
+    iterations : int
+        Solves, each with the Laplacian of the surface that the one before left. The first has that of
+        ``V``. With k = 1 they lead to a minimal surface [Pinkall and Polthier 1993].
+
+    Returns
+    -------
+    (n, 3) float64
+        Vertices; those outside of the region are those of ``V``, bit for bit.
+
+    Raises
+    ------
+    MeshInputError
+        V and F are no mesh, or faces in the region have no area.
+    OptionError
+        A region, an order or an area that does not exist.
+    SingularSystemError
+        The region holds a whole component of the mesh.
+    """
+    vertices, faces = as_mesh(V, F)
+    free = as_mask(region, len(vertices), "region", "vertex")
+    count = positive_count(iterations, "iterations")
+    x = vertices.copy()
+    if not free.any():
+        return x
+    for _ in range(count):
+        x = Polyharmonic(x, faces, free, k, area).solve(x)
+    return x
+
+
+class Polyharmonic:
+    """The system ``Delta^k x = 0`` at some vertices of a mesh, factored.
+
+    With a length it is ``x + (-length^2 Delta)^k x = y``: waves much longer than ``2 pi length`` pass,
+    shorter ones do not [Desbrun et al. 1999, section 4.2]. It is made of the faces around these
+    vertices only.
+    """
+
+    def __init__(
+        self,
+        V: FloatArray,
+        F: NDArray[np.int64],
+        free: BoolArray,
+        k: int,
+        area: Area = "voronoi",
+        length: float | None = None,
+    ) -> None:
+        if k not in (1, 2, 3) or isinstance(k, bool):
+            raise OptionError(
+                f"k must be 1 (membrane), 2 (thin plate) or 3 (minimal variation); got {k!r}"
+            )
+        near = _faces_around(F, free, int(k) - 1)
+        used = np.zeros(len(V), np.bool_)
+        used[F[near]] = True
+        lonely = np.flatnonzero(free & ~used)
+        if len(lonely):
+            raise OptionError(f"{which(lonely, 'vertex')} that should move belong to no face of F")
+        self.vertices = np.flatnonzero(used)
+        number = np.full(len(V), -1, np.int64)
+        number[self.vertices] = np.arange(len(self.vertices))
+        X, inner = V[self.vertices], number[F[near]]
+        areas = vertex_areas(X, inner, area)
+        A = polyharmonic_matrix(cotangent_matrix(X, inner), areas, int(k))
+        self._pull = np.zeros(len(X))
+        if length is not None:
+            self._pull = areas
+            A = sp.diags_array(areas) + (-(length**2)) ** int(k) * A
+        self._is_free = free[self.vertices]
+        self.solver = LaplacianSolver(A, ~self._is_free)
+
+    def solve(self, values: FloatArray) -> FloatArray:
+        """Return values (n, c) of all vertices with those of the free ones replaced."""
+        result = values.copy()
+        given = values[self.vertices]
+        found = self.solver.solve(self._pull[:, None] * given, given[~self._is_free])
+        result[self.vertices[self._is_free]] = found[self._is_free]
+        return result
+
+
+def _faces_around(F: NDArray[np.int64], vertices: BoolArray, rings: int) -> NDArray[np.intp]:
+    """Faces that touch some vertices or so many rings around these."""
+    reached = vertices.copy()
+    for _ in range(rings):
+        reached[F[reached[F].any(axis=1)]] = True
+    return np.flatnonzero(reached[F].any(axis=1))

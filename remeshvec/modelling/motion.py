@@ -1,0 +1,84 @@
+"""Parts of a motion: an affine map by a share w, 0 for none of it and 1 for all."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.vocabulary import FloatArray
+
+__all__ = ["part_of_motion", "rotations_between"]
+
+# Radians below which the axis of a screw is too far away to be turned about.
+_NO_TURN = 1e-6
+
+
+def part_of_motion(
+    affine: NDArray[np.float64], centre: FloatArray, points: FloatArray, w: FloatArray
+) -> FloatArray:
+    """Move every point by its own share of an affine map.
+
+    The map is a rotation after a stretch about ``centre`` (polar decomposition), and a translation. The
+    rigid part is a screw motion, of which points go the w-th part along their helix; the stretch is
+    interpolated linearly.
+
+    Parameters
+    ----------
+    affine : (3, 4) float
+        For column vectors.
+    centre : (3,) float
+    points : (n, 3) float
+    w : (n,) float
+
+    Returns
+    -------
+    (n, 3) float64
+    """
+    from scipy.spatial.transform import Rotation
+
+    U, sizes, Wt = np.linalg.svd(affine[:, :3])
+    sign = np.sign(np.linalg.det(U @ Wt)) or 1.0
+    rotation = (U * [1.0, 1.0, sign]) @ Wt
+    stretch = (Wt.T * (sizes * [1.0, 1.0, sign])) @ Wt
+    away = points - centre
+    away = away + w[:, None] * (away @ (stretch - np.eye(3)).T)
+    omega = Rotation.from_matrix(rotation).as_rotvec()
+    angle = float(np.linalg.norm(omega))
+    shift = affine[:, :3] @ centre + affine[:, 3] - centre
+    turns = Rotation.from_rotvec(w[:, None] * omega)
+    if angle < _NO_TURN:
+        return np.asarray(centre + turns.apply(away) + w[:, None] * shift)
+    # What a shift has across the axis is a turn about a point.
+    axis = omega / angle
+    along = axis * (axis @ shift)
+    across = shift - along
+    pivot = 0.5 * (across + np.cross(axis, across) / np.tan(0.5 * angle))
+    return np.asarray(centre + pivot + turns.apply(away - pivot) + w[:, None] * along)
+
+
+def rotations_between(P: FloatArray, Q: FloatArray, F: NDArray[np.int64]) -> FloatArray:
+    """Rotation (n, 3, 3) at every vertex from P to Q: the nearest to the mean gradient around it.
+
+    Gradients of faces take the unit normal to the unit normal, and count with their area in P.
+    """
+    before, area = _frames(P, F)
+    after, _ = _frames(Q, F)
+    good = area > 1e-12 * area.max(initial=0.0)
+    gradient = np.zeros_like(before)
+    solved = np.linalg.solve(before[good].swapaxes(1, 2), after[good].swapaxes(1, 2))
+    gradient[good] = solved.swapaxes(1, 2) * area[good, None, None]
+    total = np.zeros((len(P), 3, 3))
+    for c in range(3):
+        np.add.at(total, F[:, c], gradient)
+    U, _, Wt = np.linalg.svd(total)
+    U[:, :, 2] *= np.sign(np.linalg.det(U @ Wt))[:, None]
+    return np.asarray(U @ Wt)
+
+
+def _frames(X: FloatArray, F: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    """Two edges and the unit normal of every face as columns; and twice its area."""
+    a, b = X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]
+    normal = np.cross(a, b)
+    area = np.linalg.norm(normal, axis=1)
+    normal /= np.maximum(area, np.finfo(float).tiny)[:, None]
+    return np.stack([a, b, normal], axis=2), area

@@ -1,0 +1,292 @@
+"""Multiresolution editing: details turn with the smooth base they lie on, and the base is remeshed.
+
+A surface is split into its base, the support made fair, and its details, what the base lacks [Kobbelt
+et al. 1998]. The base follows the handle; where its triangles stretch it is remeshed [Botsch and Kobbelt
+2004, A remeshing approach to multiresolution modeling, section 5]; details are put back, turned as the
+base is turned. New vertices know by their births where on the base at rest they lie, and so where they
+go and which detail is theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.check import as_mesh, positive_number
+from ..core.vocabulary import FloatArray
+from ..pipeline.remesh import remesh
+from .editing import Transform, as_transform, split_vertices
+from .fairing import Polyharmonic
+from .laplacians import Area
+from .motion import part_of_motion, rotations_between
+
+__all__ = ["EditedSurface", "MultiresolutionEditor"]
+
+IntArray = NDArray[np.int64]
+
+# The base is remeshed where edges of the support leave this range of lengths [the report's thresholds],
+# or an angle falls below so many degrees.
+_SHORT, _LONG = 0.5, 1.5
+_SMALL_ANGLE = 28.0
+
+# Times that the base is remeshed in one move: new vertices come to lie beside the triangles that they
+# were made on, where these were long at rest.
+_CORRECTIONS = 4
+
+
+@dataclass(frozen=True)
+class EditedSurface:
+    """A surface after a move; unpacks as ``V, F = surface``.
+
+    Attributes
+    ----------
+    V : (n, 3) float64
+    F : (m, 3) int64
+    base : (n, 3) float64
+        The smooth surface under the details.
+    birth_face, birth_barycentric : (n,) int64, (n, 3) float64
+        Where on the surface at rest each vertex lies: face, and weights of its corners.
+    support : (n,) bool
+        Vertices that are neither handle nor fixed.
+    remeshed : int
+        How often the support was remeshed since the surface was at rest.
+    """
+
+    V: FloatArray
+    F: IntArray
+    base: FloatArray
+    birth_face: IntArray
+    birth_barycentric: FloatArray
+    support: NDArray[np.bool_]
+    remeshed: int
+
+    def __iter__(self) -> Iterator[NDArray[np.generic]]:
+        """Unpack."""
+        return iter((self.V, self.F))
+
+
+class MultiresolutionEditor:
+    """Deform a detailed surface: details turn with it, and stretched triangles are replaced.
+
+    The base of the support goes a share w of the way of the handle, ``Delta^k w = 0`` between 0 at the
+    fixed part and 1 at the handle: of a rigid motion that share of its screw, so that bars bend and
+    twist without getting thinner, by any angle.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+    F : (m, 3) int
+    handle, fixed : (k,) int or (n,) bool
+        As in `Editor`. What lies between them is the support.
+    k : {1, 2, 3}
+        Order of the base, and of the way in which it follows.
+    detail_size : float, optional
+        Waves of the support shorter than about this, in units of V, are details. By default all that
+        the surface of `fair` lacks: right for a patch, but a long tube has no fair surface with any
+        volume.
+    length : float, optional
+        Edge length of the support where it is remeshed, in units of V. By default the mean length of
+        its edges at rest.
+    remesh : bool
+        Whether to remesh.
+    area : {"voronoi", "uniform"}
+        See `vertex_areas`.
+
+    Attributes
+    ----------
+    base : (n, 3) float64
+        The smooth base at rest.
+    details : (n, 3) float64
+        What it lacks: ``V - base``.
+
+    Raises
+    ------
+    MeshInputError, OptionError, SingularSystemError
+        As `Editor`; a length that is not positive.
+    """
+
+    def __init__(
+        self,
+        V: ArrayLike,
+        F: ArrayLike,
+        handle: ArrayLike,
+        fixed: ArrayLike,
+        k: int = 2,
+        *,
+        detail_size: float | None = None,
+        length: float | None = None,
+        remesh: bool = True,
+        area: Area = "voronoi",
+    ) -> None:
+        vertices, faces = as_mesh(V, F)
+        self._V, self._F = vertices.copy(), faces.copy()
+        is_handle, is_fixed, support = split_vertices(len(vertices), faces, handle, fixed)
+        self._handle = np.flatnonzero(is_handle)
+        self._remesh = bool(remesh)
+        cutoff = None
+        if detail_size is not None:
+            cutoff = positive_number(detail_size, "detail_size", "units of V") / (2.0 * np.pi)
+        self.base = Polyharmonic(self._V, self._F, support, k, area, cutoff).solve(self._V)
+        self.details = self._V - self.base
+        self._length = _mean_edge_of(self._V[self._F[support[self._F].any(axis=1)]])
+        if length is not None:
+            self._length = positive_number(length, "length", "units of V")
+        self._follow = Polyharmonic(self.base, self._F, support, k, area)
+        self._share = self._follow.solve(is_handle[:, None].astype(np.float64))
+        births = _own_births(len(vertices), faces)
+        self._now = _Current(self._F, self._handle, np.flatnonzero(is_fixed), support, *births)
+
+    def move(self, *transforms: Transform) -> EditedSurface:
+        """Return the surface with its handle moved from where it is at rest.
+
+        Parameters
+        ----------
+        *transforms : (4, 4) or (3, 4) float, (h, 3) float, or callable
+            As in `Editor.move`. Several are a path: each goes on from where the one before led, so that
+            four quarter turns are a whole one.
+
+        Returns
+        -------
+        EditedSurface
+            The next move goes on with its triangles.
+        """
+        motion = self._motion(transforms)
+        now = self._now
+        base = self._placed(now, motion)
+        for _ in range(_CORRECTIONS):
+            if not self._remesh or not self._is_stretched(now, base):
+                break
+            now = self._remeshed(now, base)
+            base = self._placed(now, motion)
+        self._now = now
+        return EditedSurface(
+            self._with_details(now, base), now.F.copy(), base, now.birth_face.copy(),
+            now.birth_barycentric.copy(), now.support.copy(), now.remeshed,
+        )  # fmt: skip
+
+    def _motion(self, path: Sequence[Transform]) -> list[_Step]:
+        """Turn the handle's path into what it does to the base."""
+        points = self._V[self._handle]
+        steps: list[_Step] = []
+        for transform in path:
+            affine, target = as_transform(transform, points)
+            if affine is not None:
+                centre = points.mean(axis=0)
+                steps.append(partial(self._moved_by_share, affine, centre))
+            else:
+                d = np.zeros_like(self._V)
+                d[self._handle] = target - points
+                steps.append(partial(self._displaced, self._follow.solve(d)))
+            points = target
+        return steps
+
+    def _moved_by_share(
+        self, affine: FloatArray, centre: FloatArray, now: _Current, x: FloatArray
+    ) -> FloatArray:
+        return part_of_motion(affine, centre, x, self._at_rest(now, self._share)[:, 0])
+
+    def _displaced(self, displacement: FloatArray, now: _Current, x: FloatArray) -> FloatArray:
+        return x + self._at_rest(now, displacement)
+
+    def _placed(self, now: _Current, motion: list[_Step]) -> FloatArray:
+        """Move the base."""
+        x = self._at_rest(now, self.base)
+        for step in motion:
+            x = step(now, x)
+        return x
+
+    def _is_stretched(self, now: _Current, base: FloatArray) -> bool:
+        T = base[now.F[now.support[now.F].any(axis=1)]]
+        edges = np.linalg.norm(T - np.roll(T, 1, axis=1), axis=2)
+        if edges.max() > _LONG * self._length or edges.min() < _SHORT * self._length:
+            return True
+        return bool(_smallest_angles(T).min() < _SMALL_ANGLE)
+
+    def _remeshed(self, now: _Current, base: FloatArray) -> _Current:
+        """Remesh the support; births lead back to the surface at rest."""
+        held = np.concatenate([now.handle, now.fixed])
+        result = remesh(
+            base,
+            now.F,
+            self._length,
+            selection=now.support[now.F].any(axis=1),
+            fixed_vertices=held,
+            feature_angle=None,
+        )
+        at = result.vertex_map[held]
+        support = np.ones(len(result.V), np.bool_)
+        support[at] = False
+        face, weights = self._located(now, result.birth_face, result.birth_barycentric)
+        # Held vertices keep their own births, which lie on corners.
+        face[at], weights[at] = now.birth_face[held], now.birth_barycentric[held]
+        handle, fixed = np.split(at, [len(now.handle)])
+        return _Current(result.F, handle, fixed, support, face, weights, now.remeshed + 1)
+
+    def _located(
+        self, now: _Current, face: IntArray, weights: FloatArray
+    ) -> tuple[IntArray, FloatArray]:
+        """Births on the surface at rest, from those on the surface before remeshing."""
+        if now.remeshed == 0:
+            return face.copy(), weights.copy()
+        import igl
+
+        corners = self._at_rest(now, self.base)[now.F[face]]
+        points = np.einsum("vc,vcx->vx", weights, corners)
+        _, born, closest = igl.point_mesh_squared_distance(points, self.base, self._F)
+        a, b, c = (np.ascontiguousarray(self.base[self._F[born, i]]) for i in range(3))
+        return born, np.asarray(igl.barycentric_coordinates(closest, a, b, c))
+
+    def _at_rest(self, now: _Current, values: FloatArray) -> FloatArray:
+        """Values (n, c) of the surface at rest, at the vertices of now."""
+        corners = values[self._F[now.birth_face]]
+        return np.asarray(np.einsum("vc,vcx->vx", now.birth_barycentric, corners))
+
+    def _with_details(self, now: _Current, base: FloatArray) -> FloatArray:
+        """Add the details, turned as the base is turned."""
+        details = self._at_rest(now, self.details)
+        turn = rotations_between(self._at_rest(now, self.base), base, now.F)[now.support]
+        V = base.copy()
+        V[now.support] += np.einsum("vxy,vy->vx", turn, details[now.support])
+        return V
+
+
+@dataclass(frozen=True)
+class _Current:
+    """The triangles that the last move left, and where at rest their vertices lie."""
+
+    F: IntArray
+    handle: NDArray[np.intp]  # in the order at rest
+    fixed: NDArray[np.intp]
+    support: NDArray[np.bool_]
+    birth_face: IntArray
+    birth_barycentric: FloatArray
+    remeshed: int = 0
+
+
+_Step = Callable[[_Current, FloatArray], FloatArray]
+
+
+def _own_births(n: int, F: IntArray) -> tuple[IntArray, FloatArray]:
+    """Births of vertices on a face of their own; any, for those that no face uses."""
+    face, corner = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    for c in range(3):
+        face[F[:, c]] = np.arange(len(F))
+        corner[F[:, c]] = c
+    return face, np.eye(3)[corner]
+
+
+def _mean_edge_of(T: FloatArray) -> float:
+    """Mean length of the edges of triangles (m, 3, 3)."""
+    return float(np.linalg.norm(T - np.roll(T, 1, axis=1), axis=2).mean())
+
+
+def _smallest_angles(T: FloatArray) -> FloatArray:
+    """Smallest angle in degrees of triangles (m, 3, 3)."""
+    squared = ((T - np.roll(T, 1, axis=1)) ** 2).sum(axis=2)
+    a, b, c = np.sort(squared, axis=1).T
+    cosine = (b + c - a) / (2.0 * np.sqrt(np.maximum(b * c, np.finfo(float).tiny)))
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))

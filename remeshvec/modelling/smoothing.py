@@ -1,0 +1,149 @@
+"""Implicit fairing: steps of mean curvature flow that no step length makes unstable."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.check import as_mask, as_mesh, positive_count, positive_number
+from ..core.vocabulary import FloatArray
+from ..errors import MeshInputError, OptionError
+from ..mesh.repair import count_edges
+from .laplacians import Area, cotangent_matrix, vertex_areas
+from .solver import LaplacianSolver
+
+__all__ = ["smooth"]
+
+
+def smooth(
+    V: ArrayLike,
+    F: ArrayLike,
+    step: float | None = None,
+    iterations: int = 1,
+    *,
+    keep_volume: bool = False,
+    boundary: Literal["fixed", "free"] = "fixed",
+    fixed: ArrayLike | None = None,
+    area: Area = "voronoi",
+) -> FloatArray:
+    """Smooth a surface by mean curvature flow, with implicit steps.
+
+    Each step solves ``(M - step C) x' = M x`` [Desbrun et al. 1999, section 2.3], M the vertex areas
+    and C the cotangent matrix of the surface before it. Waves shorter than about ``2 pi sqrt(step)``
+    vanish. The system is symmetric and positive definite for any step.
+
+    Parameters
+    ----------
+    V : (n, 3) float
+    F : (m, 3) int
+    step : float, optional
+        Time of a step, in squared units of V. By default the squared mean edge length.
+    iterations : int
+        Steps.
+    keep_volume : bool
+        Scale every component about its centre of area after each step, so that it encloses as much as
+        before [Desbrun et al. 1999, section 3.3]. Only for closed, oriented surfaces.
+    boundary : {"fixed", "free"}
+        Whether boundary vertices stay; free ones shrink into the surface, as a soap film would.
+    fixed : (k,) int or (n,) bool, optional
+        Vertices that stay.
+    area : {"voronoi", "uniform"}
+        See `vertex_areas`.
+
+    Returns
+    -------
+    (n, 3) float64
+        Vertices; those that stay, and those that no face uses, are those of ``V``, bit for bit.
+
+    Raises
+    ------
+    MeshInputError
+        V and F are no mesh; a face has no area, or lost it in a step (one vanishing thin part: remesh
+        between steps, or take fewer); ``keep_volume`` for a surface that is not closed.
+    OptionError
+        A step that is not positive, other options that do not exist.
+    """
+    vertices, faces = as_mesh(V, F)
+    n = len(vertices)
+    time = _smoothing_step(step, vertices, faces)
+    count = positive_count(iterations, "iterations")
+    if boundary not in ("fixed", "free"):
+        raise OptionError(f"boundary must be one of fixed, free; got {boundary!r}")
+    stays = np.bincount(faces.ravel(), minlength=n) == 0
+    if fixed is not None:
+        stays |= as_mask(fixed, n, "fixed", "vertex")
+    if boundary == "fixed":
+        edges, uses = count_edges(faces)
+        stays[edges[uses == 1]] = True
+    parts = _closed_parts(vertices, faces) if keep_volume else []
+    if keep_volume and stays[faces].any():
+        raise OptionError("keep_volume moves all vertices; it cannot hold some fixed")
+    x = vertices.copy()
+    for i in range(count):
+        x = _flow(x, faces, stays, time, area, i)
+        for part, volume in parts:
+            _restore(x, faces[part], volume)
+    return x
+
+
+def _smoothing_step(step: float | None, V: FloatArray, F: NDArray[np.int64]) -> float:
+    if step is None:
+        T = V[F]
+        return float(np.linalg.norm(T - np.roll(T, 1, axis=1), axis=2).mean() ** 2)
+    return positive_number(step, "step", "squared units of V")
+
+
+def _flow(
+    x: FloatArray, F: NDArray[np.int64], stays: NDArray[np.bool_], time: float, area: Area, i: int
+) -> FloatArray:
+    """One implicit step."""
+    try:
+        C = cotangent_matrix(x, F)
+    except MeshInputError as error:
+        if i == 0:
+            raise
+        raise MeshInputError(f"after {i} steps: {error}") from error
+    # A vertex between faces that all but vanish has an area of 0: then it is fair already.
+    mass = np.maximum(vertex_areas(x, F, area), np.finfo(float).tiny)
+    A = sp.diags_array(mass) - time * C
+    solved = LaplacianSolver(A, stays).solve(mass[:, None] * x, x[stays])
+    solved[stays] = x[stays]
+    return solved
+
+
+def _closed_parts(V: FloatArray, F: NDArray[np.int64]) -> list[tuple[NDArray[np.intp], float]]:
+    """Faces and volume of every component."""
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(V)
+    start, end = F.ravel(), np.roll(F, -1, axis=1).ravel()
+    if not np.array_equal(np.sort(start * n + end), np.sort(end * n + start)):
+        raise MeshInputError(
+            "keep_volume needs a closed surface with faces of one winding; remesh turns them, and "
+            'boundary="fixed" keeps an open one from shrinking'
+        )
+    graph = sp.csr_array((np.ones(len(start)), (start, end)), (n, n))
+    part = connected_components(graph, directed=False)[1][F[:, 0]]
+    order = np.argsort(part, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(part[order])) + 1)
+    return [(group, _volume(V, F[group])) for group in groups]
+
+
+def _volume(V: FloatArray, F: NDArray[np.int64]) -> float:
+    a, b, c = (V[F[:, i]] - V[F[0, 0]] for i in range(3))
+    return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0)
+
+
+def _restore(x: FloatArray, F: NDArray[np.int64], volume: float) -> None:
+    """Scale a component, in place, to a volume of the same sign."""
+    now = _volume(x, F)
+    if volume == 0.0 or not now / volume > 0.0:
+        raise MeshInputError("a component turned inside out or vanished; take smaller steps")
+    a, b, c = (x[F[:, i]] for i in range(3))
+    weight = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    centre = (weight @ (a + b + c)) / (3.0 * weight.sum())
+    vertices = np.unique(F)
+    x[vertices] = centre + (x[vertices] - centre) * np.cbrt(volume / now)

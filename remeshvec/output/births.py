@@ -1,0 +1,112 @@
+"""Where vertices, faces and corners lie on the input, and the input's vertices on the result."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.compiler import compile_notice
+from ..core.threads import thread_scope
+from ..core.vocabulary import NONE, FloatArray, IndexArray, Mesh
+from ..reference.bvh import build_tree, closest_points
+from .records import Births, Provenance
+from .sides import locate_corners
+
+__all__ = ["corner_births", "face_births", "images", "vertex_births"]
+
+IntArray = NDArray[np.int64]
+
+
+def vertex_births(p: Provenance) -> Births:
+    """Faces of the input on which the vertices lie (n,), and weights of their corners (n, 3)."""
+    birth, weights = p.births()
+    if p.vertices.size:
+        birth, weights = birth[p.vertices], weights[p.vertices]
+    return _on_input(p, birth // 3, weights)
+
+
+def corner_births(p: Provenance) -> Births:
+    """Faces of the input on which the corners of faces lie (m, 3), and weights of their corners.
+
+    Those of one face all lie in its own patch, and on its own side of every curve.
+    """
+    return _on_input(p, *locate_corners(p))
+
+
+def face_births(p: Provenance) -> IntArray:
+    """Faces of the input closest to the centroids of the faces (m,), in their own patches."""
+    near, _ = locate_corners(p)
+    centroids = p.mesh.X[p.mesh.origin.reshape(-1, 3)[p.rows], :3].mean(axis=1)
+    with compile_notice(), thread_scope(p.threads) as parallel:
+        p.reference.surface.parallel = parallel
+        hint = near[:, 0].astype(np.int32)
+        face, _ = closest_points(p.reference.tree, centroids, hint, p.trust, parallel)
+    return p.face_source[face].astype(np.int64)
+
+
+def images(p: Provenance) -> Births:
+    """Faces of the result closest to the vertices of the input (n_in,), and weights of their corners.
+
+    -1 for vertices that no face uses.
+    """
+    mesh, reference = p.mesh, p.reference
+    alive = np.sort(p.rows)
+    patch = reference.tree.patch[mesh.source[alive]]
+    with compile_notice(), thread_scope(p.threads) as parallel:
+        twin = _twins_inside(mesh, alive)
+        tree = build_tree(mesh.X, mesh.origin.reshape(-1, 3)[alive], twin, patch, parallel)
+        hint = _faces_near(p, alive, patch)
+        points = np.ascontiguousarray(reference.X[:, :3])
+        face, weights = closest_points(tree, points, hint, 0.0, parallel)
+    place = np.empty(mesh.origin.size // 3, np.int64)
+    place[p.rows] = np.arange(len(p.rows))
+    image, barycentric = np.full(p.n_in, -1, np.int64), np.zeros((p.n_in, 3))
+    image[p.vertex_source], barycentric[p.vertex_source] = place[alive[face]], weights
+    return (
+        (image, barycentric)
+        if p.representative is None
+        else (image[p.representative], barycentric[p.representative])
+    )
+
+
+def _on_input(p: Provenance, face: NDArray[np.integer], weights: FloatArray) -> Births:
+    """Faces of the reference to faces of the input."""
+    source = p.face_source[face].astype(np.int64)
+    if p.flipped is not None:
+        is_flipped = p.flipped[source]
+        weights = weights.copy()
+        weights[is_flipped] = weights[is_flipped][:, [0, 2, 1]]
+    return source, weights
+
+
+# -- from the input to the result -------------------------------------------------------------
+
+
+def _twins_inside(mesh: Mesh, alive: IndexArray) -> IndexArray:
+    """Twins among the faces that are left, ``NONE`` on curves."""
+    new = np.full(mesh.origin.size // 3, NONE, np.int64)
+    new[alive] = np.arange(len(alive))
+    h = (3 * alive.astype(np.int64)[:, None] + np.arange(3)).ravel()
+    twin = mesh.twin[h].astype(np.int64)
+    is_inner = (twin != NONE) & (mesh.curve[h] == NONE)
+    return np.where(is_inner, 3 * new[twin // 3] + twin % 3, NONE).astype(np.int32)
+
+
+def _faces_near(p: Provenance, alive: IndexArray, patch: IndexArray) -> IndexArray:
+    """Faces of the result, as places in ``alive``, near the vertices of the reference."""
+    origin = p.reference.origin
+    of_face = np.full(origin.size // 3, NONE)
+    near, _ = locate_corners(p)
+    place = np.empty(p.mesh.origin.size // 3, np.int64)
+    place[alive] = np.arange(len(alive))
+    np.maximum.at(of_face, near.ravel(), np.repeat(place[p.rows], 3))
+    hint = np.full(len(p.reference.X), NONE)
+    np.maximum.at(hint, origin, np.repeat(of_face, 3))
+    # Vertices beside which nothing is born take the face of one before them in the same patch.
+    own = np.full(len(hint), NONE)
+    own[origin] = np.repeat(p.reference.tree.patch, 3)
+    last = np.maximum.accumulate(np.where(hint != NONE, np.arange(len(hint)), 0))
+    hint = np.where((hint == NONE) & (own[last] == own), hint[last], hint)
+    first = np.zeros(int(p.reference.tree.patch.max()) + 1, np.int64)
+    first[patch[::-1]] = np.arange(len(patch))[::-1]
+    return np.where(hint == NONE, first[np.maximum(own, 0)], hint).astype(np.int32)

@@ -1,0 +1,87 @@
+"""What happened in a call: options, counts, seconds, quality; and values that are made when asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ..input.options import Options
+from ..measures.quality import Quality, quality
+
+__all__ = [
+    "Report",
+]
+
+
+@dataclass
+class Report:
+    """What happened in a call.
+
+    Attributes
+    ----------
+    target_length : float
+        L, in the units of the input.
+    options : Options
+        The options in force.
+    sweeps : list of dict
+        Counts of edges split, collapsed and flipped, one dict a sweep.
+    seconds : dict
+        Seconds by phase, and "total".
+    stop : str
+        Why the sweeps ended.
+    dirt : dict
+        What was wrong with the input, and how often; empty for a clean mesh.
+    features : dict
+        Creases of the input that are kept: "crease_edges", "chains", "corners", and how many edges the
+        rule of ``feature_angle="auto"`` dropped: "dropped_echo", "dropped_noise", "dropped_short".
+    deviation : dict
+        With ``max_deviation`` or an adaptive length, the largest distance found: "to_input" from
+        samples of the result (21 a face, on a grid) to the input, and "from_input" from such samples of
+        the input to the result. With ``max_deviation`` no sample exceeds 0.8 times the bound; what lies
+        between samples is not looked at.
+    """
+
+    target_length: float
+    options: Options
+    sweeps: list[dict[str, int]]
+    seconds: dict[str, float]
+    stop: str
+    dirt: dict[str, int]
+    features: dict[str, int]
+    deviation: dict[str, float]
+    before: tuple[ArrayLike, ArrayLike] = field(repr=False)
+    after: tuple[ArrayLike, ArrayLike] = field(repr=False)
+
+    @property
+    def preset(self) -> str:
+        """Name of the preset that the call started from."""
+        return self.options.preset
+
+    @cached_property
+    def quality_before(self) -> Quality:
+        """Quality of the input; computed when first asked for, from the caller's arrays."""
+        return quality(*self.before, L=self.target_length)
+
+    @cached_property
+    def quality_after(self) -> Quality:
+        """Quality of the output; computed when first asked for."""
+        return quality(*self.after, L=self.target_length)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as a JSON-ready dict."""
+        return {
+            "target_length": self.target_length,
+            "preset": self.preset,
+            "options": dict(vars(self.options)),
+            "sweeps": self.sweeps,
+            "seconds": self.seconds,
+            "stop": self.stop,
+            "dirt": self.dirt,
+            "features": self.features,
+            "deviation": self.deviation,
+            "quality_before": self.quality_before.to_dict(),
+            "quality_after": self.quality_after.to_dict(),
+        }

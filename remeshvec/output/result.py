@@ -1,0 +1,266 @@
+"""What a call returns: the mesh, and what connects it with the input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.lazy import Lazy, LazyRecipe
+from ..errors import OptionError
+from .report import Report
+from .transfer import as_matrix, as_values, interpolate, pick, to_numpy
+
+__all__ = ["RemeshResult"]
+
+IntArray = NDArray[np.int64]
+FloatArray = NDArray[np.float64]
+Births = tuple[NDArray[Any], FloatArray]
+
+_PLACES = ("vertices", "faces", "corners")
+
+
+@dataclass
+class RemeshResult:
+    """A remeshed surface; unpacks as ``V, F = result``.
+
+    What few callers read is computed when it is first asked for. Until then a result holds the faces
+    of the input and its own once more in memory.
+
+    Attributes
+    ----------
+    V : (n, 3)
+        Vertices, in the dtype of the input (float64 for integers).
+    F : (m, 3)
+        Faces, in the dtype of the input.
+    report : Report
+    face_labels : (m,) int, or None
+        Label of every face, where the input had labels.
+    lengths : (n,) float64
+        Target edge length at every vertex.
+    """
+
+    V: Any
+    F: Any
+    report: Report
+    face_labels: NDArray[Any] | None
+    lengths: FloatArray
+    _births: Lazy[Births] = field(repr=False, compare=False)
+    _face_births: LazyRecipe[IntArray] = field(repr=False, compare=False)
+    _corner_births: LazyRecipe[Births] = field(repr=False, compare=False)
+    _images: LazyRecipe[Births] = field(repr=False, compare=False)
+    _vertex_map: Lazy[IntArray] = field(repr=False, compare=False)
+    _face_map: Lazy[IntArray] = field(repr=False, compare=False)
+    _feature_edges: Lazy[IntArray] = field(repr=False, compare=False)
+    _corners: Lazy[IntArray] = field(repr=False, compare=False)
+
+    def __iter__(self) -> Iterator[NDArray[Any]]:
+        return iter((self.V, self.F))
+
+    def show(self, *, title: str = "", up: str = "y") -> None:
+        """Show a page with both meshes, histograms and measures (the extra ``[html]``).
+
+        In a Jupyter notebook it appears below the cell, about 5 MB of output; elsewhere it opens in
+        the browser, from a file in the folder for temporary files.
+
+        Parameters
+        ----------
+        title : str
+            Heading, such as the name of the mesh.
+        up : {"y", "z"}
+            Axis that points up in the first view.
+
+        Raises
+        ------
+        PlotlyMissingError
+            Plotly is not installed.
+        OptionError
+            `up` is no such axis.
+        """
+        from ..html_page import show_html
+
+        show_html(self, title=title, up=up)
+
+    # -- where things lie -------------------------------------------------------------------
+
+    @property
+    def birth_face(self) -> IntArray:
+        """Input face on which each vertex lies, (n,)."""
+        return self._births()[0]
+
+    @property
+    def birth_barycentric(self) -> FloatArray:
+        """Where on its birth face each vertex lies, (n, 3).
+
+        ``V = sum(birth_barycentric[:, i] * V_in[F_in[birth_face, i]])`` for vertices that lie on the
+        input; otherwise that is the point of the input closest to the vertex, among those that a walk
+        over the input sees where it ends within 0.05 L.
+        """
+        return self._births()[1]
+
+    @property
+    def face_birth(self) -> IntArray:
+        """Input face closest to the centroid of each face, (m,), between the same creases."""
+        return self._face_births()
+
+    @property
+    def corner_birth_face(self) -> IntArray:
+        """Input face on which each corner of each face lies, (m, 3).
+
+        Where `birth_face` names one side of a crease, seam or border, this names the side of the face.
+        """
+        return self._corner_births()[0]
+
+    @property
+    def corner_birth_barycentric(self) -> FloatArray:
+        """Where on its birth face each corner of each face lies, (m, 3, 3)."""
+        return self._corner_births()[1]
+
+    @property
+    def image_face(self) -> IntArray:
+        """Output face closest to each input vertex, (n_in,); -1 for vertices that no face uses."""
+        return self._images()[0]
+
+    @property
+    def image_barycentric(self) -> FloatArray:
+        """Where on its image face each input vertex lies, (n_in, 3)."""
+        return self._images()[1]
+
+    @property
+    def vertex_map(self) -> IntArray:
+        """For every input vertex the output vertex that is the same, bit for bit; -1 for none."""
+        return self._vertex_map()
+
+    @property
+    def face_map(self) -> IntArray:
+        """For every input face that had to stay the output face; -1 for the others."""
+        return self._face_map()
+
+    @property
+    def feature_edges(self) -> IntArray:
+        """Edges on creases, boundaries, borders of labels, and where sheets meet, (k, 2)."""
+        return self._feature_edges()
+
+    @property
+    def corners(self) -> IntArray:
+        """Vertices that did not move, (k,)."""
+        return self._corners()
+
+    # -- data -------------------------------------------------------------------------------
+
+    def transfer(self, values: Any, on: str = "vertices", method: str = "auto") -> Any:
+        """Bring data of the input to the result.
+
+        Parameters
+        ----------
+        values : array or tensor
+            One entry, of any shape, for every input vertex (n_in, ...), face (m_in, ...) or corner of a
+            face (m_in, 3, ...) or (3 m_in, ...). With tensors of PyTorch, gradients flow back.
+        on : {"vertices", "faces", "corners"}
+            What the values belong to. Faces take the value of the input face on which their centroid
+            lies, between the same creases and borders. Corners take that of their own side: values that
+            jump at a crease or at a seam given as ``preserve=`` jump there afterwards.
+        method : {"auto", "linear", "nearest"}
+            How to find values inside input faces: linear in barycentric coordinates, or the value at
+            the corner with the largest of them. ``"auto"``: linear for floating point numbers, nearest
+            for all else. Whole numbers that are interpolated linearly (colours) are rounded.
+
+        Returns
+        -------
+        (n, ...), (m, ...) or (m, 3, ...)
+            In the dtype of ``values``.
+
+        Raises
+        ------
+        OptionError
+            The shape does not fit, or there is no such ``on`` or ``method``.
+        """
+        m = len(self._input_faces)
+        if _place(on) == "faces":
+            values = as_values(values, (m,), on)
+            return pick(values, self.face_birth)
+        if on == "vertices":
+            values = as_values(values, (self._n_in,), on)
+            return interpolate(values, *self._vertex_weights(), method)
+        is_flat = np.ndim(values) >= 1 and len(values) == 3 * m and np.shape(values)[:2] != (m, 3)
+        values = as_values(values, (3 * m,) if is_flat else (m, 3), on)
+        flat = values.reshape(3 * m, *values.shape[1 if is_flat else 2 :])
+        out = interpolate(flat, *self._corner_weights(), method)
+        return out if is_flat else out.reshape(-1, 3, *out.shape[1:])
+
+    def matrix(self, on: str = "vertices") -> Any:
+        """Return the sparse matrix P with ``values_out = P @ values_in``.
+
+        Parameters
+        ----------
+        on : {"vertices", "faces", "corners"}
+            As in `transfer`; corners are numbered ``3 * face + corner``.
+
+        Returns
+        -------
+        scipy.sparse.csr_array
+            (n, n_in), (m, m_in) or (3 m, 3 m_in) float64; the rows sum to 1.
+        """
+        m = len(self._input_faces)
+        if _place(on) == "faces":
+            births = self.face_birth
+            return as_matrix(births[:, None], np.ones((len(births), 1)), m)
+        if on == "vertices":
+            return as_matrix(*self._vertex_weights(), self._n_in)
+        return as_matrix(*self._corner_weights(), 3 * m)
+
+    def transfer_back(self, values: Any, on: str = "vertices", method: str = "auto") -> Any:
+        """Bring data of the result back to the vertices of the input.
+
+        Parameters
+        ----------
+        values : (n, ...) or (m, ...) array or tensor
+        on : {"vertices", "faces"}
+            Whether the values belong to vertices or faces of the result.
+        method : {"auto", "linear", "nearest"}
+            As in `transfer`, at the point of the result closest to each input vertex.
+
+        Returns
+        -------
+        (n_in, ...)
+            NaN, or 0 for types without it, at vertices that no face uses.
+        """
+        if on == "faces":
+            return pick(as_values(values, (len(self.F),), on), self.image_face)
+        if on != "vertices":
+            raise OptionError(f'on must be "vertices" or "faces" here; got {on!r}')
+        values = as_values(values, (len(self.V),), on)
+        return interpolate(values, *self._image_weights(), method)
+
+    def back_matrix(self) -> Any:
+        """Return the sparse matrix (n_in, n) with ``transfer_back(x) = B @ x``; rows sum to 1 or 0."""
+        return as_matrix(*self._image_weights(), len(self.V))
+
+    @property
+    def _input_faces(self) -> NDArray[Any]:
+        return to_numpy(self.report.before[1])
+
+    @property
+    def _n_in(self) -> int:
+        return len(to_numpy(self.report.before[0]))
+
+    def _vertex_weights(self) -> tuple[IntArray, FloatArray]:
+        return self._input_faces[self.birth_face].astype(np.int64), self.birth_barycentric
+
+    def _corner_weights(self) -> tuple[IntArray, FloatArray]:
+        face, weights = self._corner_births()
+        return 3 * face.reshape(-1, 1) + np.arange(3), weights.reshape(-1, 3)
+
+    def _image_weights(self) -> tuple[IntArray, FloatArray]:
+        index = to_numpy(self.F)[self.image_face].astype(np.int64)
+        index[self.image_face < 0] = -1
+        return index, self.image_barycentric
+
+
+def _place(on: Any) -> str:
+    if not isinstance(on, str) or on not in _PLACES:
+        raise OptionError(f"on must be one of {', '.join(_PLACES)}; got {on!r}")
+    return on

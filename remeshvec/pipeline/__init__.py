@@ -1,0 +1,1 @@
+"""One call, start to end; the only place that knows all stages."""

@@ -1,0 +1,148 @@
+"""One prepared mesh on its way through the sweeps: with one length, or several until a count is met."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core.vocabulary import DEAD, FloatArray, Mesh
+from ..errors import OptionError
+from ..input.constraints import Constraints
+from ..input.prepare import Prepared
+from ..reference.build import FeaturedReference, build_reference
+from ..sizing.adaptive import Adaptive
+from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
+from ..sweeps.sweeps import Sweeps
+
+__all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
+
+# Tries to meet a number of faces or vertices, and how near is near enough.
+_TRIES = 8
+_CLOSE_ENOUGH = 0.02
+
+Lengths = float | ArrayLike | Callable[[FloatArray], ArrayLike] | Adaptive
+
+
+@dataclass(frozen=True)
+class Sizing:
+    """What the caller says about sizes, checked as far as it can be without the mesh."""
+
+    L: Lengths | None
+    gradation: float
+    max_faces: int
+
+
+@dataclass(frozen=True)
+class Remeshed:
+    """A remeshed surface in the frame of `Prepared`."""
+
+    mesh: Mesh
+    is_compact: bool
+    featured: FeaturedReference
+    length: float  # of the mean new edge, in the units of the input
+
+    def count(self, noun: str) -> int:
+        """Count faces or vertices."""
+        alive = self.mesh.origin[::3] if noun == "faces" else self.mesh.vertex_halfedge
+        return int(np.count_nonzero(alive != DEAD))
+
+    def count_held(self) -> int:
+        """Count faces that had to stay."""
+        return 0 if self.featured.held is None else int(self.featured.held.sum())
+
+
+class Job:
+    """One prepared mesh, to be remeshed with one length or several."""
+
+    def __init__(
+        self,
+        prepared: Prepared,
+        constraints: Constraints,
+        V: FloatArray,
+        sizing: Sizing,
+        sweeps: Sweeps,
+    ) -> None:
+        self.prepared = prepared
+        self.constraints = constraints
+        self.V = V
+        self.sizing = sizing
+        self.sweeps = sweeps
+        self.parallel = sweeps.is_parallel(len(prepared.mesh.origin) // 3)
+        with sweeps.watch.time("reference"):
+            self.size = mesh_size(prepared, self.parallel)
+        sweeps.scale = prepared.scale
+        sweeps.gradation = sizing.gradation
+        if isinstance(sizing.L, Adaptive):
+            sweeps.tolerance = sizing.L.tolerance * prepared.scale
+            sweeps.shortest = adaptive_limits(prepared, sizing.L)[0]
+            sweeps.limit_lengths = lambda x: limited_lengths(prepared, x, sizing.gradation)
+
+    def run_once(self) -> Remeshed:
+        """Remesh, and let go of the prepared mesh; lengths from the curvature need it again."""
+        if isinstance(self.sizing.L, Adaptive):
+            return self.run(None)
+        meshes = [self.prepared.mesh]
+        nothing = Mesh(*(array[:0].copy() for array in meshes[0]))  # type: ignore[arg-type]
+        self.prepared = self.prepared._replace(mesh=nothing)
+        return self._sweep(meshes, self.sizing.L)
+
+    def run(self, L: Lengths | None) -> Remeshed:
+        """Remesh a copy of the mesh."""
+        return self._sweep([self.prepared.mesh.copy()], self.sizing.L if L is None else L)
+
+    def _sweep(self, meshes: list[Mesh], L: Lengths | None) -> Remeshed:
+        """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
+        with self.sweeps.watch.time("reference"):
+            featured, length = self._build_reference(meshes[0], L)
+        mesh = self.sweeps.run(meshes.pop(), featured)
+        is_compact = self.sweeps.has_more(featured)
+        mesh = self.sweeps.finish(mesh, featured) if is_compact else mesh
+        return Remeshed(mesh, is_compact, featured, length / self.prepared.scale)
+
+    def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
+        """Set the lengths of a mesh, mark its features, build the reference."""
+        prepared, constraints = self.prepared._replace(mesh=mesh), self.constraints
+        source, angle = prepared.vertex_source, constraints.feature_angle
+        marks = constraints.on_mesh(mesh, source, prepared.face_source, prepared.representative)
+        length = set_lengths(
+            prepared,
+            self.size,
+            self.V,
+            L,
+            marks,
+            angle,
+            self.sizing.gradation,
+            self.sizing.max_faces,
+            self.sweeps.options.max_deviation,
+        )
+        mean_edge = self.size.mean_edge
+        return build_reference(mesh, source, angle, marks, mean_edge, self.parallel), length
+
+
+def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
+    """Remesh with one length after another until the count is met within 2 %."""
+    faces = wanted if noun == "faces" else 2 * wanted
+    if faces > job.sizing.max_faces:
+        raise OptionError(
+            f"n_{noun} = {wanted:,} is more than max_faces = {job.sizing.max_faces:,}"
+        )
+    L = sqrt(job.size.area / faces / (sqrt(3.0) / 4.0)) / job.prepared.scale
+    best = None
+    for _ in range(_TRIES):
+        done = job.run(L)
+        count = done.count(noun)
+        if best is None or abs(count - wanted) < abs(best.count(noun) - wanted):
+            best = done
+        held = done.count_held() // (1 if noun == "faces" else 2)
+        if abs(count - wanted) <= _CLOSE_ENOUGH * wanted or job.sweeps.stop == "cancelled":
+            break
+        L *= min(2.0, max(0.5, sqrt(max(count - held, 1) / max(wanted - held, 1))))
+    assert best is not None
+    count = best.count(noun)
+    if abs(count - wanted) > _CLOSE_ENOUGH * wanted:
+        job.sweeps.stop += f"; {count:,} {noun} are as near to {wanted:,} as {_TRIES} tries came"
+    return best

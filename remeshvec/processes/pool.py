@@ -1,0 +1,351 @@
+"""Worker processes that do one task after another; one that dies takes its task with it, no other.
+
+Plain processes and pipes. `concurrent.futures` gives up all tasks when one process dies, and what
+`multiprocessing` starts runs the caller's script again, which then needs a guard. Every worker has a
+thread here that hands it the next task when it has answered, so that it works on while the caller does
+something else.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from time import monotonic, perf_counter
+from typing import Any, BinaryIO, NamedTuple
+
+from ..core.threads import available_threads
+from ..errors import OptionError, WorkerError
+from .worker import END_PATIENCE, attempt, receive, send
+
+__all__ = ["Outcome", "run_here", "run_in_processes"]
+
+# Tasks in the hands of this module, for every worker: one that it does, and some that wait for it or,
+# where answers have to keep their order, for an earlier one. Sizes differ by a factor of twenty.
+AHEAD = 4
+
+_STARTS = 3  # tries to start a worker
+
+_START = (
+    "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); "
+    "from remeshvec.processes.worker import serve; serve()"
+)
+
+
+class Outcome(NamedTuple):
+    """What became of one task."""
+
+    number: int  # of the task
+    value: Any  # None where there is an error
+    error: Exception | None
+    seconds: float
+
+
+def run_here(function: Callable[..., Any], tasks: Iterable[Any], common: Any) -> Iterator[Outcome]:
+    """Do tasks one by one in this process; the next is taken when the last one's outcome is."""
+    for index, task in enumerate(tasks):
+        outcome = Outcome(index, *attempt(function, task, common))
+        task = None  # an error keeps the frames that led to it
+        yield outcome
+        del outcome
+
+
+def run_in_processes(
+    function: Callable[..., Any],
+    tasks: Iterable[Any],
+    common: Any,
+    workers: int,
+    ordered: bool = True,
+    timeout: float | None = None,
+    warm_up: Callable[[], None] | None = None,
+) -> Iterator[Outcome]:
+    """Do tasks in processes: ``function(task, common)``.
+
+    Parameters
+    ----------
+    function : callable
+        Of a module, by whose name the workers find it.
+    tasks : iterable
+        Taken when they are needed: at most ``AHEAD * workers`` before the outcome of the first of them
+        is asked for.
+    common : object
+        What all tasks share.
+    workers : int
+        Number of processes; each may use its part of the cores.
+    ordered : bool
+        Whether outcomes come in the order of the tasks.
+    timeout : float, optional
+        Seconds after which a task is given up, with its worker.
+    warm_up : callable, optional
+        What a worker does before its first task, outside of the timeout.
+
+    Raises
+    ------
+    OptionError
+        ``common`` cannot be sent to the workers.
+    WorkerError
+        No worker can be started.
+    """
+    pool = _Pool(_setup(function, common, warm_up), workers, timeout)
+    try:
+        yield from _collect(pool, iter(tasks), AHEAD * workers, ordered)
+    finally:
+        pool.stop()
+
+
+def _collect(pool: _Pool, tasks: Iterator[Any], most: int, ordered: bool) -> Iterator[Outcome]:
+    """Keep the pool busy, and yield outcomes in their turn."""
+    waiting: dict[int, Outcome] = {}
+    given = done = 0  # tasks handed out, outcomes handed on
+    more = True
+    while True:
+        while more and given - done < most:
+            try:
+                task = next(tasks)
+            except StopIteration:
+                more = False
+                break
+            pool.tasks.put((given, task))
+            given += 1
+            task = None  # the caller's arrays are the caller's
+        if done == given:
+            return
+        while not (done in waiting if ordered else waiting):
+            outcome = pool.answer()
+            waiting[outcome.number] = outcome
+        outcome = waiting.pop(done if ordered else next(iter(waiting)))
+        done += 1
+        yield outcome
+
+
+def _setup(*parts: Any) -> bytes:
+    try:
+        content = pickle.dumps(parts, 5)
+        if b"__main__" not in content:
+            return content
+    except Exception as error:
+        content = None
+        problem = error
+    content = _with_cloudpickle(parts) or content
+    if content is None:
+        raise OptionError(
+            f"an option cannot be sent to worker processes ({problem}); functions can with the package "
+            "cloudpickle, and workers=1 sends nothing"
+        ) from problem
+    return content
+
+
+def _with_cloudpickle(value: Any) -> bytes | None:
+    """Pickle functions of a script or without a name, which pickle cannot, if the package is here."""
+    try:
+        import cloudpickle
+    except ImportError:
+        return None
+    try:
+        return cloudpickle.dumps(value)
+    except Exception:
+        return None
+
+
+class _Pool:
+    """The threads that feed workers, and the workers."""
+
+    def __init__(self, setup: bytes, count: int, timeout: float | None) -> None:
+        self.setup, self.timeout = setup, timeout
+        self.tasks: queue.SimpleQueue[tuple[int, Any] | None] = queue.SimpleQueue()
+        self.workers: set[_Worker] = set()
+        self.threads = max(1, available_threads() // count)
+        self.folder = os.getcwd()  # where relative paths start, also for workers to come
+        self._answers: queue.SimpleQueue[Outcome | Exception] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._stopping = False
+        self._feeders = [
+            threading.Thread(target=self._feed, daemon=True, name="remeshvec feeder")
+            for _ in range(count)
+        ]
+        for feeder in self._feeders:
+            feeder.start()
+
+    def answer(self) -> Outcome:
+        """Return the next outcome, in any order."""
+        answer = None
+        while answer is None:
+            try:  # in turns: elsewhere than on Unix an interrupt does not end a wait
+                answer = self._answers.get(timeout=1.0)
+            except queue.Empty:
+                continue
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    def stop(self) -> None:
+        """End all workers, whatever they are doing, and wait for their end."""
+        with self._lock:
+            self._stopping = True
+            workers = list(self.workers)
+        for worker in workers:
+            worker.end_soon()
+        for _ in self._feeders:
+            self.tasks.put(None)
+        deadline = monotonic() + END_PATIENCE
+        for worker in workers:
+            worker.end(deadline - monotonic())
+        for feeder in self._feeders:
+            feeder.join(1.0)
+
+    def _feed(self) -> None:
+        """Hand tasks to one worker, which is replaced when it dies."""
+        worker = None
+        try:
+            while not self._stopping and (task := self.tasks.get()) is not None:
+                if worker is None:
+                    worker = self._started()
+                outcome = self._outcome(worker, *task)
+                task = None
+                if not worker.is_alive:
+                    self._let_go(worker)
+                    worker = None
+                self._answers.put(outcome)
+                del outcome
+        except OSError as error:  # no more processes, or no memory for one
+            self._answers.put(WorkerError(f"no worker process can be started: {error}"))
+        except Exception as error:
+            self._answers.put(error)
+        finally:
+            if worker is not None:
+                worker.end_soon()
+                self._let_go(worker)
+
+    def _outcome(self, worker: _Worker, index: int, task: Any) -> Outcome:
+        start = perf_counter()
+        try:
+            message = pickle.dumps(task, 5)
+        except Exception as error:
+            reason = f"it cannot be sent to a worker process ({error}); workers=1 sends nothing"
+            return Outcome(index, None, WorkerError(reason), 0.0)
+        try:
+            return Outcome(index, *pickle.loads(worker.ask(message, self.timeout)))
+        except WorkerError as error:
+            return Outcome(index, None, error, perf_counter() - start)
+        except Exception as error:
+            reason = f"its result cannot be received from the worker process: {error}"
+            return Outcome(index, None, WorkerError(reason), perf_counter() - start)
+
+    def _started(self) -> _Worker:
+        """Start a worker; one that dies on the way, for want of memory say, is tried again."""
+        for left in reversed(range(_STARTS)):
+            with self._lock:
+                if self._stopping:
+                    raise WorkerError("the batch was stopped")
+                worker = _Worker(self.threads, self.folder)
+                self.workers.add(worker)
+            try:
+                refusal = pickle.loads(worker.ask(self.setup))
+            except WorkerError as error:
+                self._let_go(worker)
+                if not left:
+                    raise WorkerError(f"no worker process can be started: {error}") from error
+            else:
+                if refusal is None:
+                    return worker
+                self._let_go(worker)
+                break
+        raise OptionError(
+            f"worker processes cannot use an option ({refusal}); functions have to stand in a module "
+            "that they can import, or need the package cloudpickle; workers=1 sends nothing"
+        )
+
+    def _let_go(self, worker: _Worker) -> None:
+        worker.end()
+        worker.close()
+        with self._lock:
+            self.workers.discard(worker)
+
+
+class _Worker:
+    """A process, and the pipes to and from it."""
+
+    def __init__(self, threads: int, folder: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _START],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            cwd=folder,
+            env={**os.environ, "NUMBA_NUM_THREADS": str(threads)},
+            start_new_session=True,  # Ctrl-C is for us, who then end the workers
+        )
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._to: BinaryIO = self._process.stdin  # type: ignore[assignment]
+        self._from: BinaryIO = self._process.stdout  # type: ignore[assignment]
+        self.is_alive = True
+        path = [os.path.abspath(entry) for entry in sys.path]  # "" is the folder we are in
+        try:
+            self._to.write(pickle.dumps(path))
+        except OSError:
+            self.is_alive = False
+
+    def ask(self, message: bytes, timeout: float | None = None) -> bytes:
+        """Send a message and wait for the answer.
+
+        Raises
+        ------
+        WorkerError
+            There was none: the process has died, or was ended because it took too long.
+        """
+        late = threading.Event()
+        timer = threading.Timer(timeout or 0.0, self._give_up, [late])
+        if timeout is not None:
+            timer.daemon = True
+            timer.start()
+        try:
+            send(self._to, message)
+            answer = receive(self._from)
+        except (OSError, ValueError, EOFError) as error:
+            self.is_alive = False
+            self.end()
+            if late.is_set():
+                raise WorkerError(f"it took longer than the timeout of {timeout:g} s") from None
+            raise WorkerError(f"its worker process died ({self._how()})") from error
+        finally:
+            timer.cancel()
+        return answer
+
+    def end_soon(self) -> None:
+        """Ask the process to drop what it is doing, which clears half-written files away."""
+        self.is_alive = False
+        self._process.terminate()
+
+    def end(self, patience: float = END_PATIENCE) -> None:
+        """Wait for the end of the process, and bring it about."""
+        try:
+            self._process.wait(max(0.0, patience))
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def close(self) -> None:
+        """Close the pipes; for the thread that uses them."""
+        for pipe in (self._to, self._from):
+            with suppress(OSError):  # what was not sent yet has nobody to go to
+                pipe.close()
+
+    def _give_up(self, late: threading.Event) -> None:
+        late.set()
+        self.end_soon()
+        self.end()
+
+    def _how(self) -> str:
+        code = self._process.returncode
+        if code >= 0:
+            return f"exit code {code}"
+        try:
+            name = signal.Signals(-code).name
+        except ValueError:
+            name = f"signal {-code}"
+        return f"{name}, perhaps for want of memory" if name == "SIGKILL" else name

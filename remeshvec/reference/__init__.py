@@ -1,0 +1,1 @@
+"""The input surface as the sweeps look back at it: its curves, its patches, its tree."""

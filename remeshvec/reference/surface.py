@@ -1,0 +1,25 @@
+"""The input surface, as sweeps look back at it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..core.vocabulary import FloatArray, IndexArray, Tree
+from .bvh import Surface
+
+__all__ = ["Reference"]
+
+
+class Reference(NamedTuple):
+    """The input surface: what vertices are projected onto and born on."""
+
+    surface: Surface  # gets its tree when it is first projected onto
+    X: FloatArray  # (n, 4), target lengths in the last column
+    origin: IndexArray  # (3 m,)
+    curve_neighbours: IndexArray  # (2, 3 m), see `polyline.join_edges`
+    arcs: FloatArray  # (3, 3 m), see `polyline.measure_arcs`
+
+    @property
+    def tree(self) -> Tree:
+        """The tree over its faces, built when it is first asked for."""
+        return self.surface.tree

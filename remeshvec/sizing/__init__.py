@@ -1,0 +1,1 @@
+"""A target edge length at every vertex."""

@@ -1,0 +1,1 @@
+"""The loop over the operations, and what comes after the last one."""

@@ -1,0 +1,222 @@
+"""The guard of `max_deviation`: samples of both surfaces, and what to hold where they lie too far apart.
+
+A sweep is tried on a copy. Samples of the new mesh must lie near the input, samples of the input near
+the new mesh; where one does not, the vertices and edges of the mesh before the sweep are held around it,
+and the sweep is run again. So no operation needs to know, whatever moved the surface.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.vocabulary import (
+    CURVE,
+    DEAD,
+    FROZEN,
+    HALTED,
+    HELD,
+    INNER,
+    NON_MANIFOLD,
+    NONE,
+    PINNED,
+    FloatArray,
+    IndexArray,
+    Mesh,
+    Tree,
+)
+from ..features.polyline import find_siblings
+from ..reference.build import FeaturedReference
+from ..reference.bvh import build_tree, closest_faces
+
+__all__ = ["DeviationGuard", "edges_to_refine", "sample_mesh", "shortened_lengths"]
+
+# Samples of a face lie on a grid of so many steps along every side.
+_STEPS = 5
+_GRID = np.array(
+    [[i, j, _STEPS - i - j] for i in range(_STEPS + 1) for j in range(_STEPS + 1 - i)], float
+)
+_GRID /= _STEPS
+
+# Samples must keep this share of the distance: between them it may be a little more.
+_SAMPLED_SHARE = 0.8
+
+
+def sample_mesh(X: FloatArray, F: IndexArray) -> tuple[FloatArray, IndexArray]:
+    """Sample every face of a mesh at 21 points: its corners, four on each side and six inside.
+
+    Returns
+    -------
+    points : (21 m, 3) float64
+        Those of a face together.
+    face : (21 m,) int32
+    """
+    points = np.einsum("kc,mcx->mkx", _GRID, X[F, :3]).reshape(-1, 3)
+    return points, np.repeat(np.arange(len(F), dtype=np.int32), len(_GRID))
+
+
+class DeviationGuard:
+    """Compares meshes with the input, and holds what must not go on.
+
+    Parameters
+    ----------
+    built : Built
+    distance : float
+        Largest deviation, in the frame of the meshes.
+    parallel : bool
+    """
+
+    def __init__(self, featured: FeaturedReference, distance: float, parallel: bool) -> None:
+        self.reference = featured.reference
+        self.distance = distance
+        self.parallel = parallel
+        F = self.reference.origin.reshape(-1, 3)
+        self.samples, _ = sample_mesh(self.reference.X, F)
+        self.before: Tree | None = None
+        self.held = np.zeros(0, np.bool_)
+
+    def remember(self, mesh: Mesh) -> None:
+        """Take note of a mesh, compact, before it is changed."""
+        self.before = _tree_of(mesh, self.parallel)
+        self.held = np.zeros(len(mesh.X), np.bool_)
+
+    def distances(self, mesh: Mesh, trust: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distances of samples: of the mesh from the input, and of the input from the mesh.
+
+        Returns
+        -------
+        points : (k, 3) float64
+            Samples of the mesh.
+        to_input : (k,) float64
+            Within ``trust`` an upper bound; likewise the next.
+        from_input : (j,) float64
+            For `samples`.
+        """
+        alive = mesh.origin[::3] != DEAD
+        F = mesh.origin.reshape(-1, 3)[alive]
+        points, face = sample_mesh(mesh.X, F)
+        hint = _hints(mesh, F, mesh.source[alive])[face]
+        _, to_input = closest_faces(self.reference.tree, points, hint, trust, self.parallel)
+        tree = _tree_of(mesh, self.parallel)
+        anywhere = np.full(len(self.samples), NONE, np.int32)
+        _, from_input = closest_faces(tree, self.samples, anywhere, trust, self.parallel)
+        return points, to_input, from_input
+
+    def offenders(self, mesh: Mesh) -> FloatArray:
+        """Return the samples of either surface that lie too far from the other, (k, 3)."""
+        limit = _SAMPLED_SHARE * self.distance
+        points, to_input, from_input = self.distances(mesh, limit)
+        return np.concatenate([points[to_input > limit], self.samples[from_input > limit]])
+
+    def hold(self, mesh: Mesh, points: FloatArray, rings: int) -> None:
+        """Hold the mesh that was remembered around points, and so many rings of faces more."""
+        assert self.before is not None
+        anywhere = np.full(len(points), NONE, np.int32)
+        faces, _ = closest_faces(self.before, points, anywhere, 0.0, self.parallel)
+        F = mesh.origin.reshape(-1, 3)
+        is_held = np.zeros(len(mesh.X), np.bool_)
+        is_held[F[faces]] = True
+        for _ in range(rings):
+            is_held[F[is_held[F].any(axis=1)]] = True
+        _agree_across_sheets(mesh, is_held)
+        inner, on_curve = is_held & (mesh.kind == INNER), is_held & (mesh.kind == CURVE)
+        mesh.kind[inner], mesh.kind[on_curve] = HELD, PINNED
+        self.held[inner | on_curve] = True
+        ends = is_held[mesh.origin] & is_held[F[:, [1, 2, 0]].ravel()]
+        mesh.curve[ends & (mesh.curve == NONE)] = HALTED
+
+    def release(self, mesh: Mesh) -> None:
+        """Let go of what was held for a sweep, after it."""
+        mesh.kind[self.held & (mesh.kind == HELD)] = INNER
+        mesh.kind[self.held & (mesh.kind == PINNED)] = CURVE
+        mesh.curve[mesh.curve == HALTED] = NONE
+
+    def measure(self, mesh: Mesh) -> dict[str, float]:
+        """Largest distance of a sample, each way."""
+        _, to_input, from_input = self.distances(mesh, 0.0)
+        return {"to_input": float(to_input.max()), "from_input": float(from_input.max())}
+
+
+def _worst_distances(
+    mesh: Mesh, featured: FeaturedReference, trust: float, parallel: bool
+) -> FloatArray:
+    """Largest distance of a sample of each face of a compact mesh from the input."""
+    F = mesh.origin.reshape(-1, 3)
+    points, face = sample_mesh(mesh.X, F)
+    hint = _hints(mesh, F, mesh.source)[face]
+    _, distance = closest_faces(featured.reference.tree, points, hint, trust, parallel)
+    return distance.reshape(len(F), -1).max(axis=1)
+
+
+def shortened_lengths(
+    mesh: Mesh, featured: FeaturedReference, tolerance: float, parallel: bool
+) -> FloatArray:
+    """Target lengths at the vertices of the input, shorter where faces are off by more than a tolerance.
+
+    The error goes with the square of the length; a length falls by no more than 0.7 at a time.
+    """
+    worst = _worst_distances(mesh, featured, tolerance, parallel)
+    X = featured.reference.X
+    anywhere = np.full(len(X), NONE, np.int32)
+    face, _ = closest_faces(_tree_of(mesh, parallel), X[:, :3], anywhere, 0.0, parallel)
+    share = tolerance / np.maximum(worst[face], tolerance)
+    return np.asarray(X[:, 3] * np.maximum(np.sqrt(share), 0.7))
+
+
+def edges_to_refine(
+    mesh: Mesh, featured: FeaturedReference, tolerance: float, parallel: bool
+) -> IndexArray:
+    """Longest edge of every face with a sample farther than ``tolerance`` from the input.
+
+    Only where it is longer than its target: shorter ones follow ridges of the input's own faces, which
+    splits come no nearer to.
+
+    Returns
+    -------
+    (k,) int32
+        Half-edges that may be split; on seams, those of all sheets.
+    """
+    faces = np.flatnonzero(_worst_distances(mesh, featured, tolerance, parallel) > tolerance)
+    F = mesh.origin.reshape(-1, 3)
+    corners = mesh.X[F[faces], :3]
+    length = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2)
+    length[mesh.curve.reshape(-1, 3)[faces] == FROZEN] = 0.0
+    edges = 3 * faces + length.argmax(axis=1)
+    edges = edges[length.max(axis=1) > mesh.X[F[faces], 3].mean(axis=1)]
+    if featured.on_non_manifold is not None:
+        on_non_manifold = np.flatnonzero(mesh.curve >= NON_MANIFOLD).astype(np.int32)
+        members, group = find_siblings(mesh.X, mesh.origin, on_non_manifold)
+        chosen = np.isin(members, edges)
+        if chosen.any():
+            chosen = np.logical_or.reduceat(chosen, group[:-1])
+            edges = np.union1d(edges, members[np.repeat(chosen, np.diff(group))])
+    return edges.astype(np.int32)
+
+
+def _tree_of(mesh: Mesh, parallel: bool) -> Tree:
+    alive = mesh.origin[::3] != DEAD
+    F = mesh.origin.reshape(-1, 3)[alive]
+    new = np.cumsum(alive) - 1
+    twin = mesh.twin.reshape(-1, 3)[alive].ravel()
+    twin = np.where(twin == NONE, NONE, 3 * new[twin // 3] + twin % 3).astype(np.int32)
+    return build_tree(mesh.X, F, twin, np.zeros(len(F), np.int32), parallel)
+
+
+def _hints(mesh: Mesh, F: IndexArray, source: IndexArray) -> IndexArray:
+    """Faces of the reference to start at: where an inner corner was born, or any of the patch."""
+    hint = source.copy()
+    for corner in range(3):
+        v = F[:, corner]
+        hint = np.where(mesh.kind[v] <= HELD, mesh.birth[v] // 3, hint)
+    return hint.astype(np.int32)
+
+
+def _agree_across_sheets(mesh: Mesh, is_held: NDArray[np.bool_]) -> None:
+    """Hold all vertices that lie where a held one lies on a boundary: sheets may share it."""
+    h = np.flatnonzero(mesh.twin == NONE)
+    border = np.unique(mesh.origin[h])
+    if len(border):
+        _, place = np.unique(mesh.X[border, :3], axis=0, return_inverse=True)
+        held = np.zeros(len(border), np.bool_)
+        held[place.reshape(-1)[is_held[border]]] = True
+        is_held[border] = held[place.reshape(-1)]

@@ -1,0 +1,273 @@
+"""Pictures of a mesh before and after, with PyVista (the extra ``[viz]``).
+
+`picture` renders offscreen to a file, `show` opens a window; both put the two meshes side by side
+under one camera.
+"""
+
+from __future__ import annotations
+
+import importlib
+import io
+import os
+import sys
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import RemeshvecError
+from ..files.plain import check_writable, write_file
+
+__all__ = [
+    "PICTURE_SUFFIXES",
+    "ViewerMissingError",
+    "picture",
+    "require_viewer",
+    "show",
+    "three_quarter_view",
+]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Arrays = tuple[ArrayLike, ArrayLike]  # V (n, 3), F (m, 3)
+
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+BACKGROUND, FRONT, BACK, EDGE, TEXT = "white", "#d3e3f3", "#ecd5b8", "#1c2a3a", "#1c2a3a"
+# Seen from the side that shows most, turned by a third of a right angle and from a little above:
+# depth is seen, and hardly any of the silhouette is lost.
+TURN, ELEVATION = np.radians(28.0), np.radians(17.0)
+# Below this share of the largest extent a surface lies like a map and is seen from high above.
+FLAT, FLAT_ELEVATION = 0.25, np.radians(50.0)
+UP = {"y": np.eye(3), "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])}  # x, up, front
+VIEW_ANGLE = 20.0  # degrees; a long lens, so that near triangles do not look larger
+MARGIN = 1.06
+TITLE_BAND = 0.04  # height of the titles, in widths of the picture
+LOWEST, HIGHEST = 0.25, 0.6  # height of a picture without the titles, in widths
+CLEAR_EDGE, FAINTEST = 11.0, 0.25  # pixels an edge needs to be drawn in full; least opacity
+
+
+class ViewerMissingError(RemeshvecError, ImportError):
+    """PyVista is not installed, or there is no display to open a window on."""
+
+
+class Camera(NamedTuple):
+    """Where to look from: unit vectors from the object to the eye, to the right, and up."""
+
+    eye: FloatArray
+    right: FloatArray
+    up: FloatArray
+
+
+class CameraFrame(NamedTuple):
+    """What is in the picture: the middle, half the width and height, and the size in pixels."""
+
+    middle: FloatArray
+    half_width: float
+    half_height: float
+    pixels: tuple[int, int]
+
+
+def picture(
+    path: str | os.PathLike[str],
+    before: Arrays,
+    after: Arrays,
+    *,
+    titles: tuple[str, str] = ("before", "after"),
+    width: int = 1600,
+    up: str = "y",
+) -> None:
+    """Render two meshes side by side into a picture file, without a window.
+
+    Parameters
+    ----------
+    path : str or path
+        PNG or JPEG file; replaced when the new one is complete.
+    before, after : ((n, 3) float, (m, 3) int)
+        Vertices and faces of the two meshes.
+    titles : (str, str)
+        Names that stand above the meshes, with their numbers of faces.
+    width : int
+        Width in pixels; the height follows from the object.
+    up : {"y", "z"}
+        Axis that points up: y in most models of figures, z in most of buildings and parts.
+
+    Raises
+    ------
+    ViewerMissingError
+        PyVista is not installed.
+    MeshFormatError
+        The file cannot be written.
+    """
+    pyvista = require_viewer()
+    check_writable(path, PICTURE_SUFFIXES)
+    from PIL import Image
+
+    # VTK warns on stderr that there is no X server, then renders without one.
+    with pyvista.vtk_verbosity("off"):
+        plotter = _plotter(pyvista, before, after, titles, width, up, off_screen=True)
+        try:
+            image = plotter.screenshot(return_img=True)
+        finally:
+            plotter.close()
+    content = io.BytesIO()
+    form = "PNG" if os.fspath(path).lower().endswith(".png") else "JPEG"
+    Image.fromarray(np.asarray(image)).save(content, form, optimize=True, quality=92)
+    write_file(path, content.getvalue())
+
+
+def show(
+    before: Arrays,
+    after: Arrays,
+    *,
+    titles: tuple[str, str] = ("before", "after"),
+    width: int = 1600,
+    up: str = "y",
+) -> None:
+    """Open a window with two meshes side by side and linked cameras; returns when it is closed.
+
+    Parameters and errors are those of `picture`, but for the path.
+
+    Raises
+    ------
+    ViewerMissingError
+        PyVista is not installed, or there is no display.
+    """
+    pyvista = require_viewer(window=True)
+    _plotter(pyvista, before, after, titles, width, up, off_screen=False).show()
+
+
+def require_viewer(*, window: bool = False) -> Any:
+    """Import PyVista and return it; to be called before long work is done for a picture.
+
+    Parameters
+    ----------
+    window : bool
+        Whether a window is to be opened, which needs a display.
+
+    Raises
+    ------
+    ViewerMissingError
+        PyVista is not installed, or there is no display.
+    """
+    try:
+        pyvista = importlib.import_module("pyvista")
+    except ImportError as error:
+        raise ViewerMissingError(
+            "pictures and the viewer need PyVista: pip install 'remeshvec[viz]'"
+        ) from error
+    has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if window and sys.platform.startswith("linux") and not has_display:
+        raise ViewerMissingError("there is no display to open a window on; make a picture instead")
+    return pyvista
+
+
+def _plotter(
+    pyvista: Any,
+    before: Arrays,
+    after: Arrays,
+    titles: tuple[str, str],
+    width: int,
+    up: str,
+    *,
+    off_screen: bool,
+) -> Any:
+    """Set the scene: two meshes, one camera for both."""
+    meshes = [_as_arrays(mesh) for mesh in (before, after)]
+    camera = three_quarter_view(*meshes[0], UP[up])
+    frame = _frame(np.concatenate([V[F].reshape(-1, 3) for V, F in meshes]), camera, width)
+    plotter = pyvista.Plotter(
+        shape=(1, 2), border=False, window_size=list(frame.pixels), off_screen=off_screen
+    )
+    plotter.set_background(BACKGROUND)
+    for k, ((V, F), title) in enumerate(zip(meshes, titles, strict=True)):
+        plotter.subplot(0, k)
+        # Float32 on the graphics card: scaled, so that neither size nor place costs digits.
+        points = (V - frame.middle) / frame.half_height
+        surface = pyvista.PolyData.from_regular_faces(points, F)
+        _add_surface(plotter, surface, _mean_edge(points, F) * frame.pixels[1] / 2)
+        _add_title(plotter, f"{title}: {len(F):,} faces", frame)
+        _aim(plotter, camera)
+    plotter.link_views()
+    plotter.enable_anti_aliasing("ssaa")
+    return plotter
+
+
+def _add_surface(plotter: Any, surface: Any, edge_pixels: float) -> None:
+    """Add flat-shaded faces with thin edges, fainter where they are too dense to tell apart."""
+    plotter.add_mesh(
+        surface,
+        color=FRONT,
+        backface_params={"color": BACK},
+        smooth_shading=False,
+        ambient=0.3,
+        diffuse=0.8,
+        specular=0.0,
+        show_edges=True,
+        edge_color=EDGE,
+        line_width=float(np.clip(edge_pixels / 40, 1.0, 2.0)),
+        edge_opacity=float(np.clip(edge_pixels / CLEAR_EDGE, FAINTEST, 1.0)),
+    )
+
+
+def _add_title(plotter: Any, text: str, frame: CameraFrame) -> None:
+    width, height = frame.pixels
+    title = plotter.add_text(text, position=(0.5, 1.0), viewport=True, color=TEXT)
+    style = title.prop
+    style.font_size = round(TITLE_BAND * width / 2)
+    style.justification_horizontal, style.justification_vertical = "center", "top"
+    title.position = (0.5, 1 - TITLE_BAND * width / height / 4)
+
+
+def _aim(plotter: Any, camera: Camera) -> None:
+    """Look at the scaled scene, of which the heights from -1 to 1 are in the picture."""
+    distance = 1 / np.tan(np.radians(VIEW_ANGLE / 2))
+    plotter.camera.focal_point = (0.0, 0.0, 0.0)
+    plotter.camera.position = tuple(camera.eye * distance)
+    plotter.camera.up = tuple(camera.up)
+    plotter.camera.view_angle = VIEW_ANGLE
+    plotter.reset_camera_clipping_range()
+
+
+def three_quarter_view(V: FloatArray, F: IntArray, axes: FloatArray) -> Camera:
+    """Choose a three-quarter view on the side that shows most area.
+
+    The rows of `axes` are the directions to the right, up, and to the front of the object.
+    """
+    normals = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]) @ axes.T
+    angles = np.radians(sorted(range(-85, 90, 5), key=abs))  # a half circle, its front first
+    sides = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)])
+    shown = np.abs(normals @ sides).sum(axis=0)
+    best = angles[np.flatnonzero(shown >= (1 - 1e-6) * shown.max())[0]]  # rounding breaks no ties
+    extent = np.ptp(V[F].reshape(-1, 3) @ axes.T, axis=0)
+    elevation = FLAT_ELEVATION if extent[1] < FLAT * extent.max() else ELEVATION
+    turned = best - TURN if best > 0 else best + TURN  # towards the front
+    level = np.array([np.sin(turned), 0.0, np.cos(turned)])
+    right = np.array([np.cos(turned), 0.0, -np.sin(turned)])
+    eye = np.cos(elevation) * level + np.sin(elevation) * np.array([0.0, 1.0, 0.0])
+    return Camera(eye @ axes, right @ axes, np.cross(eye, right) @ axes)
+
+
+def _frame(points: FloatArray, camera: Camera, width: int) -> CameraFrame:
+    """Fit the picture to the points: both panels show all of them, below the titles."""
+    axes = np.stack([camera.right, camera.up, camera.eye])
+    along = points @ axes.T
+    low, high = along.min(axis=0), along.max(axis=0)
+    extent = high - low
+    across, upwards, near = np.maximum(extent, 1e-6 * extent.max() or 1.0) / 2
+    # What lies nearer than the middle looks larger; half of the depth is a bound for it.
+    zoom = MARGIN * (1 + near * np.tan(np.radians(VIEW_ANGLE / 2)) / max(across, upwards))
+    object_height = width / 2 * np.clip(upwards / across, 2 * LOWEST, 2 * HIGHEST)
+    height = object_height + TITLE_BAND * width
+    unit = zoom * max(2 * upwards / object_height, 2 * across / (width / 2))  # of one pixel
+    middle = (low + high) / 2
+    middle[1] += TITLE_BAND * width * unit / 2  # the object stands below the titles
+    return CameraFrame(middle @ axes, unit * width / 4, unit * height / 2, (width, round(height)))
+
+
+def _mean_edge(V: FloatArray, F: IntArray) -> float:
+    return float(np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2).mean())
+
+
+def _as_arrays(mesh: Arrays) -> tuple[FloatArray, IntArray]:
+    return np.asarray(mesh[0], dtype=np.float64), np.asarray(mesh[1], dtype=np.int64)
