@@ -1,6 +1,7 @@
-"""The only place with Numba flags: three decorators.
+"""The only place with Numba flags: four decorators.
 
 * ``inlined``: helper, called from kernels only.
+* ``shared``: formula for kernels, on scalars, and for Python, on arrays.
 * ``kernel``: kernel, called from Python.
 * ``threaded``: a kernel over a range of pieces, called as ``name(parallel, ...)``; threads may share
   the pieces (`_threads`).
@@ -27,7 +28,7 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NopythonTypeInference
-from numba.extending import intrinsic
+from numba.extending import intrinsic, register_jitable
 
 from .threads import share, uninterrupted
 
@@ -37,6 +38,7 @@ __all__ = [
     "compile_notice",
     "inlined",
     "kernel",
+    "shared",
     "threaded",
 ]
 
@@ -109,6 +111,11 @@ def inlined(function: Callable[..., Any]) -> Any:
     if isinstance(helper, CPUDispatcher):  # not where the compiler is switched off
         helper.__class__ = _Helper
     return helper
+
+
+def shared(function: Callable[..., Any]) -> Any:
+    """Leave a formula as it is for Python, and let kernels inline it as well."""
+    return register_jitable(**_INLINED)(function)
 
 
 class _Helper(CPUDispatcher):
@@ -262,8 +269,9 @@ def _feed(digest: Any, code: CodeType, scope: dict[str, Any], seen: set[CodeType
             digest.update(repr(constant).encode())
     for name in code.co_names:
         value: Any = scope.get(name)
-        if hasattr(value, "py_func"):
-            _feed(digest, value.py_func.__code__, value.py_func.__globals__, seen)
+        function = getattr(value, "py_func", value)
+        if isinstance(function, FunctionType):
+            _feed(digest, function.__code__, function.__globals__, seen)
         elif isinstance(value, int | float | bool | str | tuple):
             digest.update(repr(value).encode())
         elif hasattr(value, "tobytes"):

@@ -13,6 +13,7 @@ from .compiler import inlined
 __all__ = [
     "SHARP",
     "angle_from_cosine",
+    "area_vector",
     "closest_on_segment",
     "closest_on_triangle",
     "corner_angles",
@@ -51,6 +52,14 @@ def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):
     wy = cy - ay
     wz = cz - az
     return uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+
+
+@inlined
+def area_vector(X, a, b, c):
+    """Twice the area times the unit normal of the face with corners ``X[a]``, ``X[b]``, ``X[c]``."""
+    return face_vector(
+        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
+    )
 
 
 @inlined

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..core.check import as_array, as_indices, as_mask
 from ..core.vocabulary import NONE, IndexArray, Mesh
 from ..errors import OptionError
-from ..mesh.walk import edge_keys, ends_of
+from ..mesh.edges import edge_keys
+from ..mesh.walk import ends_of
 
 __all__ = ["BOUNDARY_MODES", "ConstraintMasks", "Constraints", "make_constraints"]
 

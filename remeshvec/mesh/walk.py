@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..core.compiler import inlined
 
-__all__ = ["edge_keys", "ends_of", "next_halfedge", "previous_halfedge"]
+__all__ = ["ends_of", "next_halfedge", "next_spoke", "previous_halfedge"]
 
 
 @inlined
@@ -24,11 +24,12 @@ def previous_halfedge(h):
     return h - 1 + 3 * np.int64(np.uint64(h) % np.uint64(3) == np.uint64(0))
 
 
+@inlined
+def next_spoke(twin, h):
+    """Return the next half-edge counter-clockwise around an origin; ``NONE`` at the boundary."""
+    return np.int64(twin[previous_halfedge(h)])
+
+
 def ends_of(origin: NDArray[Any], h: NDArray[Any]) -> NDArray[Any]:
     """Return the vertices where half-edges start and end, (2, k), from their numbers (k,)."""
     return origin[np.stack([h, h - h % 3 + (h + 1) % 3])]
-
-
-def edge_keys(ends: NDArray[Any], n: int) -> NDArray[np.int64]:
-    """One number an edge, whichever way it runs, from its ends (2, ...) among n vertices."""
-    return np.minimum(*ends).astype(np.int64) * n + np.maximum(*ends)

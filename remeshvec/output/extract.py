@@ -21,8 +21,9 @@ from ..core.vocabulary import DEAD, FIXED, FROZEN, NONE, Blocks, FloatArray, Ind
 from ..input.constraints import Constraints
 from ..input.prepare import Prepared
 from ..mesh.blocks import make_blocks
+from ..mesh.edges import edge_keys
 from ..mesh.repair import weld_vertices
-from ..mesh.walk import edge_keys, ends_of
+from ..mesh.walk import ends_of
 from ..operations.project import locate_vertices
 from ..reference.build import FeaturedReference
 from ..reference.non_manifold import non_manifold_vertices

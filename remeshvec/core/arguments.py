@@ -1,0 +1,109 @@
+"""Checks of plain arguments: numbers, counts, flags, words, functions; one wording for all of them."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from math import isfinite
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from ..errors import OptionError
+
+__all__ = ["choice", "count", "flag", "function", "number"]
+
+
+def number(
+    value: Any,
+    name: str,
+    *,
+    above: float | None = None,
+    low: float | None = None,
+    below: float | None = None,
+    high: float | None = None,
+    unit: str = "",
+) -> float:
+    """Check a finite real number and return it as a float; booleans and strings are not numbers.
+
+    Parameters
+    ----------
+    value : object
+        What the caller gave.
+    name : str
+        Name of the argument, for the message.
+    above, below : float, optional
+        Bounds that the number must not reach.
+    low, high : float, optional
+        Bounds that it may reach.
+    unit : str
+        For the message: "degrees", "units of V".
+
+    Raises
+    ------
+    OptionError
+    """
+    is_number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
+    if is_number and isfinite(value):
+        x = float(value)
+        if (
+            (above is None or x > above)
+            and (low is None or x >= low)
+            and (below is None or x < below)
+            and (high is None or x <= high)
+        ):
+            return x
+    raise OptionError(f"{name} must be {_range(above, low, below, high, unit)}; got {value!r}")
+
+
+def _range(
+    above: float | None, low: float | None, below: float | None, high: float | None, unit: str
+) -> str:
+    """Say in words which numbers are allowed."""
+    noun = "a number" + (f" of {unit}" if unit else "")
+    bounds = [
+        f"{word} {bound:g}"
+        for word, bound in (
+            ("above", above),
+            ("at least", low),
+            ("below", below),
+            ("at most", high),
+        )
+        if bound is not None
+    ]
+    if bounds == ["above 0"]:
+        return noun.replace("a number", "a positive number")
+    return f"{noun} {' and '.join(bounds)}" if bounds else f"{noun}, finite"
+
+
+def count(value: Any, name: str, *, low: int = 1) -> int:
+    """Check a whole number that is at least ``low``, and return it as an int."""
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool | np.bool_)
+    if not is_whole or value < low:
+        raise OptionError(f"{name} must be a whole number, at least {low}; got {value!r}")
+    return int(value)
+
+
+def flag(value: Any, name: str) -> bool:
+    """Check True or False; 0, 1 and strings are neither."""
+    if not isinstance(value, bool | np.bool_):
+        raise OptionError(f"{name} must be True or False; got {value!r}")
+    return bool(value)
+
+
+def choice(value: Any, name: str, words: Iterable[str]) -> str:
+    """Check one of several words."""
+    known = tuple(words)
+    if isinstance(value, str) and value in known:
+        return value
+    near = difflib.get_close_matches(value, known, 1) if isinstance(value, str) else []
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise OptionError(f"{name} must be one of {', '.join(known)}; got {value!r}{hint}")
+
+
+def function(value: Any, name: str) -> Any:
+    """Check something that can be called."""
+    if not callable(value):
+        raise OptionError(f"{name} must be callable; got {value!r}")
+    return value

@@ -1,0 +1,35 @@
+"""Edges of bare faces, and what they connect; in NumPy and SciPy, for what is not in the inner loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["components", "edge_keys", "halfedge_ends", "unique_edges"]
+
+
+def halfedge_ends(F: NDArray[Any]) -> NDArray[Any]:
+    """Return the two vertices of every half-edge ``3 f + c``, (2, 3 m)."""
+    return np.stack([F.ravel(), F[:, [1, 2, 0]].ravel()])
+
+
+def edge_keys(ends: NDArray[Any], n: int) -> NDArray[np.int64]:
+    """One number per edge, whichever way it runs, from its ends (2, ...) among n vertices."""
+    return np.minimum(*ends).astype(np.int64) * n + np.maximum(*ends)
+
+
+def unique_edges(F: NDArray[Any]) -> NDArray[Any]:
+    """Return every edge once, (k, 2), the smaller vertex first, in ascending order."""
+    return np.unique(np.sort(halfedge_ends(F), axis=0), axis=1).T
+
+
+def components(n: int, a: NDArray[Any], b: NDArray[Any]) -> tuple[int, NDArray[np.int32]]:
+    """Count the connected components of n nodes linked from ``a[i]`` to ``b[i]``, and label them."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
+    count, label = connected_components(graph, directed=False)
+    return int(count), label
