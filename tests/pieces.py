@@ -7,8 +7,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from remeshvec.core import compiler as _jit
 from remeshvec.core import threads as _threads
+from remeshvec.core.compiler import decorators
 
 
 @contextmanager
@@ -24,7 +24,7 @@ def on_threads(n: int):
 
 
 class Shuffled:
-    """Stand-in for `_threads.share`: runs pieces alone, in a random order; remembers whose."""
+    """Stand-in for `share`: runs pieces alone, in a random order; remembers whose."""
 
     def __init__(self, seed: int = 0) -> None:
         self.rng = np.random.default_rng(seed)
@@ -39,5 +39,5 @@ class Shuffled:
 @contextmanager
 def shuffled(seed: int = 0):
     """Let ``parallel=True`` mean an order that no thread would take."""
-    with patch.object(_jit, "share", Shuffled(seed)) as order:
+    with patch.object(decorators, "share", Shuffled(seed)) as order:
         yield order

@@ -1,7 +1,7 @@
 """Plain-Python kernels on arrays that refuse to count from the end, and whose garbage is poison.
 
-Kernels are compiled with unsigned indices (`_jit`): a negative one reads far outside of the array. To be
-installed with NUMBA_DISABLE_JIT=1, before the first call.
+Kernels are compiled with unsigned indices (`core.compiler`): a negative one reads far outside of the
+array. To be installed with NUMBA_DISABLE_JIT=1, before the first call.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Numpy:
 
 def install() -> None:
     """Make all kernels of remeshvec strict."""
-    from remeshvec.core import compiler as _jit
+    from remeshvec.core import compiler
 
     modules = list(all_modules())
     for module in modules:
@@ -106,7 +106,7 @@ def install() -> None:
         function = FunctionType(self.py_func.__code__, scope, self.py_func.__name__)
         return lambda *args: plain(function(*(strict(a) for a in args)))
 
-    _jit.kernel.compiled = property(run)
+    compiler.kernel.compiled = property(run)
 
 
 def all_modules() -> list[ModuleType]:

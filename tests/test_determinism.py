@@ -25,7 +25,7 @@ from structure import (
 )
 
 import remeshvec
-from remeshvec.core import compiler as _jit
+from remeshvec.core.compiler.decorators import ThreadedKernel
 from remeshvec.core.vocabulary import FIXED, NONE
 from remeshvec.input.prepare import prepare
 from remeshvec.operations.bisect import bisect_edges
@@ -200,7 +200,7 @@ def test_every_kernel_is_the_same_in_any_order(monkeypatch):
         for one in packed[1:]:
             assert_same_bits(packed[0], one)
         current = packed[0]
-    unused = {one.__name__ for one in kernels(_jit._Threaded)} - ORDERED
+    unused = {one.__name__ for one in kernels(ThreadedKernel)} - ORDERED
     assert not unused, "kernels that this test does not reach"
 
 
@@ -225,11 +225,13 @@ def test_results_hardly_depend_on_the_blocks(monkeypatch):
 SCRIPT = """
 import hashlib, json, sys
 import numpy as np
-from remeshvec import _threads, edge_sets, remesh
+from remeshvec import remesh
+from remeshvec.core import threads as _threads
+from remeshvec.mesh import blocks
 module = sys.modules["remeshvec.sweeps.sweeps"]
 path, per_block, threshold, options = json.loads(sys.argv[1])
 data = np.load(path)
-edge_sets.FACES_PER_BLOCK = per_block
+blocks.FACES_PER_BLOCK = per_block
 seen = {}
 for threads, faces in ((1, threshold), (2, threshold), (4, threshold), (4, 10**9), (None, threshold)):
     module._PARALLEL_FACES = faces

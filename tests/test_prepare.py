@@ -8,7 +8,7 @@ from pieces import on_threads, shuffled
 from structure import assert_same_bits, assert_valid, faces_of, shape_of
 
 from remeshvec import MeshInputError
-from remeshvec.core import compiler as _jit
+from remeshvec.core.compiler import kernel
 from remeshvec.input.prepare import prepare
 from remeshvec.mesh import morton
 from remeshvec.mesh.repair import (
@@ -231,14 +231,14 @@ def test_any_array_will_do():
     """Read-only ones, and faces of 32 bits, are neither changed nor compiled for."""
     V, F = zoo.torus()
     one = prepare(V, F, False)
-    kernels = [value for value in vars(morton).values() if isinstance(value, _jit.kernel)]
-    before = [len(kernel.compiled.signatures) for kernel in kernels if kernel is not morton._survey]
+    kernels = [one for one in vars(morton).values() if isinstance(one, kernel)]
+    before = [len(one.compiled.signatures) for one in kernels if one is not morton._survey]
     for dtype in (np.int32, np.int64):
         fixed = V.copy(), F.astype(dtype)
         for array in fixed:
             array.setflags(write=False)
         assert_same_bits(prepare(*fixed, False).mesh, one.mesh)
-    after = [len(kernel.compiled.signatures) for kernel in kernels if kernel is not morton._survey]
+    after = [len(one.compiled.signatures) for one in kernels if one is not morton._survey]
     assert before == after
 
 

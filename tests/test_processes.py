@@ -14,11 +14,14 @@ ROOT = Path(__file__).resolve().parents[1]
 COMMON = """
 import hashlib, json, multiprocessing, os, sys, threading, time
 import numpy as np
-from remeshvec import _jit, _threads, edge_sets, read_mesh, remesh
+from remeshvec import read_mesh, remesh
+from remeshvec.core import threads as _threads
+from remeshvec.core.compiler import threaded
+from remeshvec.mesh import blocks
 V, F, _ = read_mesh("data/pretzel.off")
 
 def digest(threads=None, callback=None):
-    edge_sets.FACES_PER_BLOCK = 200
+    blocks.FACES_PER_BLOCK = 200
     sys.modules["remeshvec.sweeps.sweeps"]._PARALLEL_FACES = 0
     r = remesh(V, F, preset="fast", iterations=2, threads=threads, callback=callback)
     return hashlib.sha256(r.V.tobytes() + r.F.tobytes() + r.birth_barycentric.tobytes()).hexdigest()
@@ -176,7 +179,7 @@ def test_a_process_ends_while_others_of_its_threads_remesh(tmp_path):
 # -- compilation ----------------------------------------------------------------------------------
 
 COMPILED = """
-@_jit.threaded(lambda x: len(x))
+@threaded(lambda x: len(x))
 def double(pieces, x):
     for i in range(pieces[0], pieces[1]):
         x[i] *= 2.0

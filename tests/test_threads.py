@@ -15,8 +15,9 @@ import strict
 import zoo
 
 from remeshvec import remesh
-from remeshvec.core import compiler as _jit
 from remeshvec.core import threads as _threads
+from remeshvec.core.compiler import kernel as Kernel
+from remeshvec.core.compiler.decorators import ThreadedKernel
 
 ROOT = Path(__file__).resolve().parents[1]
 CORES = 4  # as the tests have it, whatever the machine says
@@ -82,7 +83,7 @@ def eventually(condition):
 
 def kernels():
     for module in strict.all_modules():
-        yield from (value for value in vars(module).values() if isinstance(value, _jit.kernel))
+        yield from (value for value in vars(module).values() if isinstance(value, Kernel))
 
 
 @needs_jit
@@ -112,7 +113,7 @@ def test_python_threads_run_while_kernels_do(monkeypatch):
     V, F = zoo.read(zoo.DATA / "pretzel.off")
     remesh(V, F, threads=1)  # compiles
     monkeypatch.setattr(
-        _jit._Threaded, "__call__", lambda self, _, *args: spans(self, watched, args)
+        ThreadedKernel, "__call__", lambda self, _, *args: spans(self, watched, args)
     )
     deadline = time.monotonic() + PATIENCE
     try:

@@ -20,8 +20,9 @@ import numpy as np, numba
 assert numba.config.DISABLE_JIT
 sys.path.insert(0, "tests")
 import zoo
-from remeshvec import edge_sets, remesh
-edge_sets.FACES_PER_BLOCK = 20
+from remeshvec import remesh
+from remeshvec.mesh import blocks
+blocks.FACES_PER_BLOCK = 20
 found = []
 for name, factor, options in json.loads(sys.argv[1]):
     V, F = zoo.perturb(*zoo.ZOO[name].make(), amount=0.02)
