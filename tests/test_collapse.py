@@ -18,19 +18,18 @@ from structure import (
 )
 
 from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, HELD, INNER
-from remeshvec.operations.collapse import (
+from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
+from remeshvec.operations.guards import keeps_curves
+from remeshvec.operations.outcomes import (
     COLLAPSED,
     KEPT_CURVE,
     KEPT_FOLDOVER,
     KEPT_LINK,
     KEPT_OVERSHOOT,
     KEPT_SLIVER,
-    N_OUTCOMES,
-    RING_CAPACITY,
-    CollapseLimits,
-    collapse_short_edges,
+    N_COLLAPSE_OUTCOMES,
 )
-from remeshvec.operations.guards import keeps_curves
+from remeshvec.operations.rings import RING_CAPACITY
 
 
 def limits(shortest, **changes):
@@ -45,7 +44,7 @@ def outcomes(mesh, shortest, **changes):
 
 
 def assert_only(tally, outcome, count=1):
-    expected = np.zeros(N_OUTCOMES, int)
+    expected = np.zeros(N_COLLAPSE_OUTCOMES, int)
     expected[outcome] = count
     assert tally.tolist() == expected.tolist()
 

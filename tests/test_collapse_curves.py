@@ -39,11 +39,10 @@ from remeshvec.core.vocabulary import (
 )
 from remeshvec.features.polyline import find_siblings
 from remeshvec.operations.collapse import (
-    COLLAPSED,
-    KEPT_CURVE,
     CollapseLimits,
     collapse_short_edges,
 )
+from remeshvec.operations.outcomes import COLLAPSED, KEPT_CURVE
 from remeshvec.operations.siblings import collapse_siblings
 
 LOOSE = CollapseLimits(

@@ -14,6 +14,7 @@ from remeshvec.mesh import blocks as edge_sets
 from remeshvec.mesh.blocks import OWNED, SHIFTED, list_range, per_stage_block, vertex_range
 from remeshvec.operations import bisect, collapse, flip, untangle
 from remeshvec.operations.classify import classify_edges
+from remeshvec.operations.outcomes import N_COLLAPSE_OUTCOMES, N_FLIP_OUTCOMES
 
 
 @pytest.mark.parametrize("per_block", [4, 17, 50, 10_000])
@@ -118,7 +119,7 @@ def flip_owned(mesh, blocks, h):
     """Likewise for a flip; what it touches is its quad."""
     quad = {int(mesh.origin[g]) for side in (h, mesh.twin[h]) for g in face_of(side)}
     touched = np.zeros(len(mesh.X), np.uint8)
-    done = run_owned(flip._flip, mesh, blocks, FLIPS, h, flip.N_OUTCOMES, touched)
+    done = run_owned(flip._flip, mesh, blocks, FLIPS, h, N_FLIP_OUTCOMES, touched)
     assert set(np.flatnonzero(touched).tolist()) == (quad if done else set())
     return done
 
@@ -230,7 +231,7 @@ def collapse_owned(V, F, a, b):
     h = max(h, int(mesh.twin[h]))
     before = copied(mesh)
     done = run_owned(
-        collapse._collapse, mesh, all_but_the_last_vertex(mesh), COLLAPSES, h, collapse.N_OUTCOMES
+        collapse._collapse, mesh, all_but_the_last_vertex(mesh), COLLAPSES, h, N_COLLAPSE_OUTCOMES
     )
     if not done:
         assert_same_bits(mesh, before)

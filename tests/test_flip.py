@@ -20,18 +20,20 @@ from structure import (
 
 from remeshvec.core.vocabulary import FIXED, FROZEN, HALTED, NON_MANIFOLD, NONE, Blocks
 from remeshvec.operations.flip import (
-    FLIPPED,
-    GONE,
-    KEPT_DUPLICATE,
-    KEPT_NORMAL,
-    KEPT_SLIVER,
-    OUTSIDE,
     FlipLimits,
     bends_quad,
     duplicates_edge,
     flip_edges,
     valence_gain,
     violates_delaunay,
+)
+from remeshvec.operations.outcomes import (
+    FLIPPED,
+    KEPT_DUPLICATE,
+    KEPT_NORMAL,
+    KEPT_SLIVER,
+    NO_LONGER_WANTED,
+    NOT_OWNED,
 )
 
 LOOSE = FlipLimits(normal_cosine=0.0, delaunay_ties=False, sliver_check=False)
@@ -335,7 +337,7 @@ def test_flips_keep_topology_and_bring_valences_to_six(name, per_block, monkeypa
         for _ in range(3):
             error = np.abs(mesh.valence_excess).sum()
             tally = flip_edges(mesh, blocks, limits, False)
-            assert tally[OUTSIDE] == 0
+            assert tally[NOT_OWNED] == 0
             assert_valid(mesh)
             assert shape_of(faces_of(mesh)) == before
             after = np.abs(mesh.valence_excess).sum()
@@ -350,5 +352,5 @@ def test_every_flip_of_a_pass_still_gains():
     V, F = zoo.planar_delaunay(400)
     mesh = built(V, F, ordered=True)
     rounds = [flip_edges(mesh, one_block(mesh), LOOSE, False) for _ in range(10)]
-    assert rounds[0][GONE] > 0
+    assert rounds[0][NO_LONGER_WANTED] > 0
     assert rounds[-1][FLIPPED] == 0

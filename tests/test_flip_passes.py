@@ -21,13 +21,13 @@ from remeshvec.mesh.blocks import stages
 from remeshvec.operations import flip
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.flip import (
-    FLIPPED,
     FlipLimits,
     bends_quad,
     duplicates_edge,
     flip_edges,
-    makes_sliver,
+    flip_makes_sliver,
 )
+from remeshvec.operations.outcomes import FLIPPED, N_FLIP_OUTCOMES
 
 LIMITS = [
     FlipLimits(0.0, False, False),
@@ -94,12 +94,12 @@ class Passes:
         return not (
             duplicates_edge(mesh, c, d)
             or bends_quad(mesh, h, t, self.limits.normal_cosine)
-            or (self.limits.sliver_check and makes_sliver(mesh, h, t))
+            or (self.limits.sliver_check and flip_makes_sliver(mesh, h, t))
         )
 
     def run(self, listed):
         candidates, count = listed
-        tally = np.zeros((len(count), flip.N_OUTCOMES), np.int64)
+        tally = np.zeros((len(count), N_FLIP_OUTCOMES), np.int64)
         for stage in stages(self.blocks):
             flip._flip(
                 False, self.mesh, self.blocks, stage, self.limits, candidates, count, self.touched, tally

@@ -15,8 +15,8 @@ from structure import (
 )
 
 from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, HELD, INNER
-from remeshvec.operations.collapse import COLLAPSED, CollapseLimits, collapse_short_edges
-from remeshvec.operations.rings import KEPT_CURVE, KEPT_OVERSHOOT
+from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
+from remeshvec.operations.outcomes import COLLAPSED, KEPT_CURVE, KEPT_OVERSHOOT
 
 MESHES = [
     "torus",

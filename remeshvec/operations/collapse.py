@@ -18,25 +18,21 @@ from ..core.vocabulary import CURVE, DEAD, FROZEN, INNER, NON_MANIFOLD, NONE, Bl
 from ..mesh.blocks import DONE, list_range, per_block, per_stage_block, stages, vertex_range
 from ..mesh.walk import next_halfedge, previous_halfedge
 from .classify import REMOVED, EdgeFlags, classify_edges, is_short
-from .guards import folds_over, keeps_curves, keeps_link, makes_sliver, overshoots
-from .rings import (
+from .guards import collapse_makes_sliver, folds_over, keeps_curves, keeps_link, overshoots
+from .outcomes import (
     COLLAPSED,
-    GONE,
     KEPT_CURVE,
     KEPT_FOLDOVER,
     KEPT_LINK,
     KEPT_OVERSHOOT,
     KEPT_SLIVER,
-    N_OUTCOMES,
-    OUTSIDE,
-    RING_CAPACITY,
-    Rings,
-    measure_normals,
-    survey_rings,
+    N_COLLAPSE_OUTCOMES,
+    NO_LONGER_WANTED,
+    NOT_OWNED,
 )
+from .rings import RING_CAPACITY, Rings, measure_normals, survey_rings
 
 __all__ = [
-    "COLLAPSED",
     "CollapseLimits",
     "collapse_short_edges",
     "examine_edge",
@@ -79,10 +75,10 @@ def collapse_short_edges(
     candidates = np.empty(mesh.origin.size, np.int32)
     count = np.zeros(len(blocks.face) - 1, np.int64)
     _list_short_edges(parallel, mesh, blocks, flags.mask, candidates, count)
-    tally = np.zeros((len(count), N_OUTCOMES), np.int64)
+    tally = np.zeros((len(count), N_COLLAPSE_OUTCOMES), np.int64)
     if count.any():
         for stage in stages(blocks):
-            tally[:, OUTSIDE] = 0
+            tally[:, NOT_OWNED] = 0
             _collapse(parallel, mesh, blocks, stage, limits, candidates, count, tally)
     return tally.sum(axis=0)
 
@@ -124,7 +120,7 @@ def _collapse(span, mesh, blocks, stage, limits, candidates, count, tally):
                     continue
                 outcome = _collapse_edge(mesh, h, low, high, limits, rings)
                 tally[k, outcome] += 1
-                if outcome != OUTSIDE:
+                if outcome != NOT_OWNED:
                     candidates[i] = DONE
 
 
@@ -150,10 +146,10 @@ def examine_edge(mesh, h, low, high, limits, rings):
     a = np.int64(mesh.origin[h])
     b = np.int64(mesh.origin[next_halfedge(h)])
     if b < low or b >= high:
-        return OUTSIDE, 0.0, 0.0, 0.0, 0.0, 0, 0
+        return NOT_OWNED, 0.0, 0.0, 0.0, 0.0, 0, 0
     length = distance_squared(X, a, b)
     if not is_short(length, X[a, 3], X[b, 3], limits.shortest):
-        return GONE, 0.0, 0.0, 0.0, 0.0, 0, 0
+        return NO_LONGER_WANTED, 0.0, 0.0, 0.0, 0.0, 0, 0
     if not keeps_curves(mesh, h, a, b):
         return KEPT_CURVE, 0.0, 0.0, 0.0, 0.0, 0, 0
     # Three quarters of all candidates overshoot. Whether they do can be seen from the midpoint before
@@ -180,7 +176,7 @@ def examine_edge(mesh, h, low, high, limits, rings):
     outcome = COLLAPSED
     if folds_over(mesh, x, y, z, kind, a, b, rings, limits.foldover_cosine):
         outcome = KEPT_FOLDOVER
-    elif limits.sliver_check and makes_sliver(mesh, x, y, z, a, b, rings.face, n_a, n_b):
+    elif limits.sliver_check and collapse_makes_sliver(mesh, x, y, z, a, b, rings.face, n_a, n_b):
         outcome = KEPT_SLIVER
     return outcome, x, y, z, s, n_a, n_b
 

@@ -17,16 +17,17 @@ from ..core.geometry import distance_squared, face_vector, is_flat, mean_ratio, 
 from ..core.vocabulary import CURVE, DEAD, MAX_VALENCE, NONE, Blocks, Mesh
 from ..mesh.blocks import DONE, list_range, per_block, per_stage_block, stages, vertex_range
 from ..mesh.walk import next_halfedge, previous_halfedge
+from .outcomes import (
+    FLIPPED,
+    KEPT_DUPLICATE,
+    KEPT_NORMAL,
+    KEPT_SLIVER,
+    N_FLIP_OUTCOMES,
+    NO_LONGER_WANTED,
+    NOT_OWNED,
+)
 
 __all__ = ["FlipLimits", "flip_edges"]
-
-FLIPPED = 0
-OUTSIDE = 1
-GONE = 2
-KEPT_DUPLICATE = 3
-KEPT_NORMAL = 4
-KEPT_SLIVER = 5
-N_OUTCOMES = 6
 
 
 class FlipLimits(NamedTuple):
@@ -47,7 +48,7 @@ def flip_edges(
     """
     candidates = np.empty(mesh.origin.size, np.int32)
     touched = np.zeros(mesh.vertex_halfedge.size, np.uint8)
-    total = np.zeros(N_OUTCOMES, np.int64)
+    total = np.zeros(N_FLIP_OUTCOMES, np.int64)
     for n in range(passes):
         count = np.zeros(len(blocks.face) - 1, np.int64)
         if n == 0:
@@ -56,9 +57,9 @@ def flip_edges(
             _find_again(parallel, mesh, blocks, limits.delaunay_ties, touched, candidates, count)
         if not count.any():
             break
-        tally = np.zeros((len(count), N_OUTCOMES), np.int64)
+        tally = np.zeros((len(count), N_FLIP_OUTCOMES), np.int64)
         for stage in stages(blocks):
-            tally[:, OUTSIDE] = 0
+            tally[:, NOT_OWNED] = 0
             _flip(parallel, mesh, blocks, stage, limits, candidates, count, touched, tally)
         total += tally.sum(axis=0)
     return total
@@ -145,7 +146,7 @@ def _flip(span, mesh, blocks, stage, limits, candidates, count, touched, tally):
                     continue
                 outcome = _flip_edge(mesh, h, low, high, limits, touched)
                 tally[k, outcome] += 1
-                if outcome != OUTSIDE:
+                if outcome != NOT_OWNED:
                     candidates[i] = DONE
 
 
@@ -155,20 +156,20 @@ def _flip_edge(mesh, h, low, high, limits, touched):
     b = mesh.origin[next_halfedge(h)]
     c = mesh.origin[previous_halfedge(h)]
     if b < low or b >= high or c < low or c >= high:
-        return OUTSIDE
+        return NOT_OWNED
     t = np.int64(mesh.twin[h])
     if t == NONE:
-        return GONE
+        return NO_LONGER_WANTED
     d = mesh.origin[previous_halfedge(t)]
     if d < low or d >= high:
-        return OUTSIDE
+        return NOT_OWNED
     if not _is_wanted(mesh, h, t, limits.delaunay_ties):
-        return GONE
+        return NO_LONGER_WANTED
     if duplicates_edge(mesh, c, d):
         return KEPT_DUPLICATE
     if bends_quad(mesh, h, t, limits.normal_cosine):
         return KEPT_NORMAL
-    if limits.sliver_check and makes_sliver(mesh, h, t):
+    if limits.sliver_check and flip_makes_sliver(mesh, h, t):
         return KEPT_SLIVER
     touched[mesh.origin[h]] = 1
     touched[b] = 1
@@ -283,7 +284,7 @@ def bends_quad(mesh, h, t, cosine):
 
 
 @inlined
-def makes_sliver(mesh, h, t):
+def flip_makes_sliver(mesh, h, t):
     """Guard (optional): the worse of the two triangles would get worse."""
     a = mesh.origin[h]
     b = mesh.origin[t]

@@ -15,7 +15,14 @@ from ..core.geometry import distance_squared, face_vector, is_flat, mean_ratio, 
 from ..core.vocabulary import CURVE, INNER, NONE
 from ..mesh.walk import next_halfedge, previous_halfedge
 
-__all__ = ["folds_over", "joins_curves", "keeps_curves", "keeps_link", "makes_sliver", "overshoots"]
+__all__ = [
+    "collapse_makes_sliver",
+    "folds_over",
+    "joins_curves",
+    "keeps_curves",
+    "keeps_link",
+    "overshoots",
+]
 
 
 @inlined
@@ -116,7 +123,7 @@ def folds_over(mesh, x, y, z, kind, a, b, rings, cosine):
 
 
 @inlined
-def makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
+def collapse_makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
     """Guard (optional): the worst triangle after would be worse than the worst before."""
     X = mesh.X
     before = 1.0

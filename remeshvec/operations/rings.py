@@ -12,34 +12,15 @@ from ..core.compiler import inlined
 from ..core.geometry import SHARP
 from ..core.vocabulary import INNER, NONE, FloatArray
 from ..mesh.walk import next_halfedge, previous_halfedge
+from .outcomes import COLLAPSED, KEPT_LINK, KEPT_OVERSHOOT, NOT_OWNED
 
 __all__ = [
-    "COLLAPSED",
-    "GONE",
-    "KEPT_CURVE",
-    "KEPT_FOLDOVER",
-    "KEPT_LINK",
-    "KEPT_OVERSHOOT",
-    "KEPT_SLIVER",
-    "N_OUTCOMES",
-    "OUTSIDE",
     "RING_CAPACITY",
     "Rings",
     "make_rings",
     "measure_normals",
     "survey_rings",
 ]
-
-# Outcomes of one candidate, and columns of the tally.
-COLLAPSED = 0
-OUTSIDE = 1
-GONE = 2
-KEPT_CURVE = 3
-KEPT_LINK = 4
-KEPT_OVERSHOOT = 5
-KEPT_FOLDOVER = 6
-KEPT_SLIVER = 7
-N_OUTCOMES = 8
 
 # Edges at hubs with more spokes stay; collapses along the rim bring the valence down first.
 RING_CAPACITY = 128
@@ -89,7 +70,7 @@ def survey_rings(mesh, a, b, x, y, z, s, low, high, half_factor, slack, rings):
                 rings.face[side, i] = h
                 w = np.int64(mesh.origin[next_halfedge(h)])
             if w < low or w >= high:
-                return OUTSIDE
+                return NOT_OWNED
             px, py, pz, length = X[w, 0], X[w, 1], X[w, 2], X[w, 3]
             dx, dy, dz = px - x, py - y, pz - z
             limit = half_factor * (s + length)

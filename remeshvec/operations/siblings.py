@@ -12,7 +12,8 @@ from ..core.compiler import inlined, kernel
 from ..core.vocabulary import DEAD, FIXED, NONE, IndexArray, Mesh
 from ..mesh.walk import next_halfedge, previous_halfedge
 from .collapse import CollapseLimits, examine_edge, remove_edge
-from .rings import COLLAPSED, make_rings
+from .outcomes import COLLAPSED
+from .rings import make_rings
 
 __all__ = ["collapse_siblings"]
 
