@@ -16,6 +16,11 @@ TRIANGLES[:20, 2] = TRIANGLES[:20, 0] + 0.6 * (TRIANGLES[:20, 1] - TRIANGLES[:20
 TRIANGLES[:20] += 0.05 * RNG.normal(size=(20, 3, 3))  # twenty flat ones, mostly obtuse
 
 
+def corners(T):
+    """Turn the rows into the tuples that kernels take."""
+    return [tuple(p) for p in T]
+
+
 def squared_edges(T):
     """Squared lengths of the edges opposite corners 0, 1, 2, and twice the area."""
     opposite = [float(((T[i - 1] - T[i - 2]) ** 2).sum()) for i in range(3)]
@@ -32,7 +37,7 @@ def test_distance_squared_has_the_same_bits_both_ways():
 def test_face_vector_is_the_cross_product():
     for T in TRIANGLES:
         expected = np.cross(T[1] - T[0], T[2] - T[0])
-        assert geometry.face_vector(*T.ravel()) == pytest.approx(expected)
+        assert geometry.face_vector(*corners(T)) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("limit", [10.0, 45.0, 89.0])
@@ -40,8 +45,8 @@ def test_turn_exceeds_an_angle(limit):
     cosine = np.cos(np.radians(limit))
     for angle in (0.0, limit - 0.01, limit + 0.01, 95.0, 180.0):
         s, c = np.sin(np.radians(angle)), np.cos(np.radians(angle))
-        assert geometry.turn_exceeds(0, 0, 3.0, 0.2 * s, 0, 0.2 * c, cosine) == (angle > limit)
-    assert geometry.turn_exceeds(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, cosine)
+        assert geometry.turn_exceeds((0, 0, 3.0), (0.2 * s, 0, 0.2 * c), cosine) == (angle > limit)
+    assert geometry.turn_exceeds((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), cosine)
 
 
 def test_mean_ratio_knows_its_extremes():
@@ -93,18 +98,18 @@ def test_cotangents_agree_with_libigl():
 
 def test_closest_on_segment():
     for p, a, b in RNG.normal(size=(200, 3, 3)):
-        s, squared = geometry.closest_on_segment(*p, *a, *b)
+        s, squared = geometry.closest_on_segment(*corners((p, a, b)))
         assert 0 <= s <= 1
         assert a + s * (b - a) == pytest.approx(naive.closest_on_segment(p, a, b))
         assert squared == pytest.approx(((p - a - s * (b - a)) ** 2).sum(), rel=1e-12)
-    assert geometry.closest_on_segment(1, 0, 0, 0, 0, 0, 0, 0, 0) == (0.0, 1.0)
+    assert geometry.closest_on_segment((1, 0, 0), (0, 0, 0), (0, 0, 0)) == (0.0, 1.0)
 
 
 def test_closest_on_triangle_from_everywhere():
     regions = set()
     for T in TRIANGLES:
         for p in RNG.normal(scale=2.0, size=(30, 3)):
-            s, t, squared = geometry.closest_on_triangle(*p, *T.ravel())
+            s, t, squared = geometry.closest_on_triangle(tuple(p), *corners(T))
             point = T[0] + s * (T[1] - T[0]) + t * (T[2] - T[0])
             _, distance = naive.closest_on_triangle(p, *T)
             assert squared == pytest.approx(((p - point) ** 2).sum(), rel=1e-9, abs=1e-14)
@@ -121,7 +126,7 @@ def test_closest_on_a_needle_misses_by_no_more_than_rounding(height):
     for u in RNG.random((300, 3)):
         target = T[0] + u[0] * (T[1] - T[0]) + (1 - u[0]) * u[1] * (T[2] - T[0])
         p = target + 0.1 * (u[2] < 0.5) * rotation(3)[2]
-        _, _, squared = geometry.closest_on_triangle(*p, *T.ravel())
+        _, _, squared = geometry.closest_on_triangle(tuple(p), *corners(T))
         truth = np.linalg.norm(p - target)
         assert np.sqrt(squared) <= truth + 2e-7
 
@@ -134,7 +139,7 @@ def test_closest_on_a_triangle_without_area():
     ):
         T = np.array(T, dtype=float)
         for p in RNG.normal(scale=2, size=(50, 3)):
-            s, t, squared = geometry.closest_on_triangle(*p, *T.ravel())
+            s, t, squared = geometry.closest_on_triangle(tuple(p), *corners(T))
             assert np.isfinite([s, t, squared]).all()
             assert np.sqrt(squared) == pytest.approx(naive.closest_on_triangle(p, *T)[1])
 

@@ -1,7 +1,8 @@
-"""Formulas on scalars: lengths, normals, Voronoi areas, shape, closest points.
+"""Formulas: lengths, normals, Voronoi areas, shape, closest points.
 
-Scalars in, scalars out, no Python objects: the same source could be compiled for a GPU.
-Kernels index coordinates as ``X[v, 0..2]``.
+Scalars in, scalars out, no Python objects: the same source could be compiled for a GPU. Points and
+vectors are tuples of three numbers, which the compiler keeps in registers. Kernels index coordinates
+as ``X[v, 0..2]``; `point` reads all three.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ __all__ = [
     "is_flat",
     "mean_ratio",
     "mixed_voronoi_areas",
+    "point",
     "tangent_basis",
     "turn_exceeds",
 ]
@@ -34,6 +36,12 @@ SHARP = 0.3
 
 
 @inlined
+def point(X, v):
+    """Return the coordinates of a row of ``X`` as a tuple."""
+    return X[v, 0], X[v, 1], X[v, 2]
+
+
+@inlined
 def distance_squared(X, a, b):
     """Squared length of the edge a-b; the same bits in both directions."""
     x = X[a, 0] - X[b, 0]
@@ -43,8 +51,11 @@ def distance_squared(X, a, b):
 
 
 @inlined
-def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):
+def face_vector(a, b, c):
     """Twice the area times the unit normal of the triangle a, b, c."""
+    ax, ay, az = a
+    bx, by, bz = b
+    cx, cy, cz = c
     ux = bx - ax
     uy = by - ay
     uz = bz - az
@@ -57,9 +68,7 @@ def face_vector(ax, ay, az, bx, by, bz, cx, cy, cz):
 @inlined
 def area_vector(X, a, b, c):
     """Twice the area times the unit normal of the face with corners ``X[a]``, ``X[b]``, ``X[c]``."""
-    return face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
+    return face_vector(point(X, a), point(X, b), point(X, c))
 
 
 @inlined
@@ -73,11 +82,13 @@ def is_flat(nx, ny, nz, longest_squared):
 
 
 @inlined
-def turn_exceeds(ux, uy, uz, wx, wy, wz, cosine):
+def turn_exceeds(u, w, cosine):
     """Tell whether the angle between two vectors exceeds ``acos(cosine)``, ``cosine >= 0``.
 
     A zero ``w`` always exceeds; no square root is taken.
     """
+    ux, uy, uz = u
+    wx, wy, wz = w
     dot = ux * wx + uy * wy + uz * wz
     if dot <= 0.0:
         return True
@@ -162,8 +173,11 @@ def tangent_basis(nx, ny, nz):
 
 
 @inlined
-def closest_on_segment(px, py, pz, ax, ay, az, bx, by, bz):
+def closest_on_segment(p, a, b):
     """Parameter in [0, 1] of the point of a-b closest to p, and the squared distance."""
+    px, py, pz = p
+    ax, ay, az = a
+    bx, by, bz = b
     ux = bx - ax
     uy = by - ay
     uz = bz - az
@@ -179,13 +193,17 @@ def closest_on_segment(px, py, pz, ax, ay, az, bx, by, bz):
 
 
 @inlined
-def closest_on_triangle(px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz):
+def closest_on_triangle(p, a, b, c):
     """Barycentric weights of b and c of the closest point, and the squared distance.
 
     Where p does not lie over the triangle, the closest of its three edges decides; so it does for a
     triangle without area. Weights come from vector products: the usual scalar products lose all
     digits on needles.
     """
+    px, py, pz = p
+    ax, ay, az = a
+    bx, by, bz = b
+    cx, cy, cz = c
     ux, uy, uz = bx - ax, by - ay, bz - az
     wx, wy, wz = cx - ax, cy - ay, cz - az
     qx, qy, qz = px - ax, py - ay, pz - az
@@ -202,12 +220,12 @@ def closest_on_triangle(px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz):
         y = qy - s * uy - t * wy
         z = qz - s * uz - t * wz
         return s, t, x * x + y * y + z * z
-    best_s, best = closest_on_segment(px, py, pz, ax, ay, az, bx, by, bz)
+    best_s, best = closest_on_segment(p, a, b)
     best_t = 0.0
-    r, d = closest_on_segment(px, py, pz, ax, ay, az, cx, cy, cz)
+    r, d = closest_on_segment(p, a, c)
     if d < best:
         best_s, best_t, best = 0.0, r, d
-    r, d = closest_on_segment(px, py, pz, bx, by, bz, cx, cy, cz)
+    r, d = closest_on_segment(p, b, c)
     if d < best:
         best_s, best_t, best = 1.0 - r, r, d
     return best_s, best_t, best

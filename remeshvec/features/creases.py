@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import inlined, threaded
-from ..core.geometry import angle_from_cosine, distance_squared, face_vector
+from ..core.geometry import angle_from_cosine, area_vector, distance_squared
 from ..core.vocabulary import MAX_VALENCE, NONE, FloatArray, IndexArray
 from ..mesh.walk import previous_halfedge
 from .chains import BORDER, CLEAN, HARD, STRONG, SURE, WEAK, count_chains, keep_chains
@@ -259,9 +259,7 @@ def _measure_faces(span, X, origin, twin, normals, state, is_asked, faces):
         faces[f, 0] = faces[f, 1] = faces[f, 2] = 0.0
         if state[f] != PROPER:
             continue
-        x, y, z = face_vector(
-            X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-        )
+        x, y, z = area_vector(X, a, b, c)
         faces[f, 0] = sqrt(x * x + y * y + z * z)
         faces[f, 1] = sqrt(
             max(distance_squared(X, a, b), distance_squared(X, b, c), distance_squared(X, c, a))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel, threaded
-from ..core.geometry import distance_squared, face_vector
+from ..core.geometry import area_vector, distance_squared
 from ..core.vocabulary import NONE, FloatArray, IndexArray
 from ..mesh.walk import next_halfedge
 
@@ -125,9 +125,7 @@ def _fill_normals(span, X, origin, normals, state, slivers):
         count = 0
         for f in range(_FACES_PER_RANGE * k, min(_FACES_PER_RANGE * k + _FACES_PER_RANGE, n_faces)):
             a, b, c = origin[3 * f], origin[3 * f + 1], origin[3 * f + 2]
-            x, y, z = face_vector(
-                X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-            )
+            x, y, z = area_vector(X, a, b, c)
             double_area = sqrt(x * x + y * y + z * z)
             longest = max(
                 distance_squared(X, a, b), distance_squared(X, b, c), distance_squared(X, c, a)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel
-from ..core.geometry import closest_on_segment, distance_squared
+from ..core.geometry import closest_on_segment, distance_squared, point
 from ..core.vocabulary import NONE, FloatArray, IndexArray
 from ..mesh.walk import ends_of, next_halfedge
 from .curves import Curves
@@ -212,7 +212,7 @@ def closest_on_curve(X, origin, curve_neighbours, start, x, y, z):
     a = origin[start]
     b = origin[next_halfedge(start)]
     best = start
-    s, distance = closest_on_segment(x, y, z, X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2])
+    s, distance = closest_on_segment((x, y, z), point(X, a), point(X, b))
     reach = 3.0 * np.sqrt(distance)
     for side in range(2 if curve_neighbours.shape[1] > 0 else 0):
         before = start
@@ -223,7 +223,7 @@ def closest_on_curve(X, origin, curve_neighbours, start, x, y, z):
                 break
             a = origin[h]
             b = origin[next_halfedge(h)]
-            r, d = closest_on_segment(x, y, z, X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2])
+            r, d = closest_on_segment((x, y, z), point(X, a), point(X, b))
             if d < distance:
                 best, s, distance = h, r, d
             walked += np.sqrt(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import inlined, threaded
-from ..core.geometry import distance_squared, face_vector
+from ..core.geometry import area_vector, distance_squared
 from ..core.vocabulary import DEAD, FROZEN, Blocks, Mesh
 from ..mesh.blocks import per_block
 
@@ -124,9 +124,7 @@ def _to_split(mesh, f, mask, l0, l1, l2, limit):
         return mask
     X = mesh.X
     a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
-    nx, ny, nz = face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
+    nx, ny, nz = area_vector(X, a, b, c)
     l0 *= mask & 1
     l1 *= (mask >> 1) & 1
     l2 *= (mask >> 2) & 1

@@ -12,7 +12,7 @@ from math import sqrt
 import numpy as np
 
 from ..core.compiler import threaded
-from ..core.geometry import face_vector
+from ..core.geometry import area_vector
 from ..core.vocabulary import DEAD, HELD, INNER, MAX_VALENCE, NONE, Blocks, Mesh, Tree
 from ..mesh.blocks import per_block
 from ..mesh.walk import previous_halfedge
@@ -42,9 +42,7 @@ def _measure_gaps(span, mesh, blocks, tree, gaps):
             c = mesh.origin[3 * f + 2]
             if a == DEAD:
                 continue
-            nx, ny, nz = face_vector(
-                X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-            )
+            nx, ny, nz = area_vector(X, a, b, c)
             x = (X[a, 0] + X[b, 0] + X[c, 0]) / 3.0
             y = (X[a, 1] + X[b, 1] + X[c, 1]) / 3.0
             z = (X[a, 2] + X[b, 2] + X[c, 2]) / 3.0

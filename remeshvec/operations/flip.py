@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.compiler import inlined, threaded
-from ..core.geometry import distance_squared, face_vector, is_flat, mean_ratio, turn_exceeds
+from ..core.geometry import area_vector, distance_squared, is_flat, mean_ratio, turn_exceeds
 from ..core.vocabulary import CURVE, DEAD, MAX_VALENCE, NONE, Blocks, Mesh
 from ..mesh.blocks import DONE, list_range, per_block, per_stage_block, stages, vertex_range
 from ..mesh.walk import next_halfedge, previous_halfedge
@@ -224,9 +224,7 @@ def _cotangent(mesh, h, dot):
     a = mesh.origin[h]
     b = mesh.origin[next_halfedge(h)]
     c = mesh.origin[previous_halfedge(h)]
-    nx, ny, nz = face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
+    nx, ny, nz = area_vector(X, a, b, c)
     norm = sqrt(nx * nx + ny * ny + nz * nz)
     if norm == 0.0:
         return 0.0 if dot == 0.0 else (1e30 if dot > 0.0 else -1e30)
@@ -264,13 +262,9 @@ def bends_quad(mesh, h, t, cosine):
     b = mesh.origin[t]
     c = mesh.origin[previous_halfedge(h)]
     d = mesh.origin[previous_halfedge(t)]
-    ux, uy, uz = face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[d, 0], X[d, 1], X[d, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
-    wx, wy, wz = face_vector(
-        X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2], X[d, 0], X[d, 1], X[d, 2]
-    )
-    mx, my, mz = ux + wx, uy + wy, uz + wz
+    u = ux, uy, uz = area_vector(X, a, d, c)
+    w = wx, wy, wz = area_vector(X, b, c, d)
+    mean = ux + wx, uy + wy, uz + wz
     # Three vertices of a straight curve: the normal is rounding.
     if mesh.kind[c] >= CURVE and mesh.kind[d] >= CURVE:
         new = distance_squared(X, c, d)
@@ -278,9 +272,7 @@ def bends_quad(mesh, h, t, cosine):
             return True
         if mesh.kind[b] >= CURVE and is_flat(wx, wy, wz, new):
             return True
-    return turn_exceeds(ux, uy, uz, mx, my, mz, cosine) or turn_exceeds(
-        wx, wy, wz, mx, my, mz, cosine
-    )
+    return turn_exceeds(u, mean, cosine) or turn_exceeds(w, mean, cosine)
 
 
 @inlined
@@ -296,9 +288,7 @@ def flip_makes_sliver(mesh, h, t):
 
 @inlined
 def _flip_shape(X, a, b, c):
-    nx, ny, nz = face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
+    nx, ny, nz = area_vector(X, a, b, c)
     return mean_ratio(
         distance_squared(X, a, b),
         distance_squared(X, b, c),

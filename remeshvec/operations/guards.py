@@ -11,7 +11,14 @@ from math import sqrt
 import numpy as np
 
 from ..core.compiler import inlined
-from ..core.geometry import distance_squared, face_vector, is_flat, mean_ratio, turn_exceeds
+from ..core.geometry import (
+    distance_squared,
+    face_vector,
+    is_flat,
+    mean_ratio,
+    point,
+    turn_exceeds,
+)
 from ..core.vocabulary import CURVE, INNER, NONE
 from ..mesh.walk import next_halfedge, previous_halfedge
 
@@ -91,7 +98,7 @@ def folds_over(mesh, x, y, z, kind, a, b, rings, cosine):
     ``kind`` is that of the vertex that stays. On a curve, faces whose corners all lie on curves may
     become flat along a straight one, with a normal that is rounding.
     """
-    point = rings.point
+    at = rings.point
     normal = rings.normal
     for side in range(2):
         other = a if side else b
@@ -101,14 +108,14 @@ def folds_over(mesh, x, y, z, kind, a, b, rings, cosine):
             w = rings.vertex[side, j]
             if v == other or w == other:
                 continue
-            vx, vy, vz = point[side, i, 0], point[side, i, 1], point[side, i, 2]
-            wx, wy, wz = point[side, j, 0], point[side, j, 1], point[side, j, 2]
-            nx, ny, nz = face_vector(x, y, z, vx, vy, vz, wx, wy, wz)
+            vx, vy, vz = at[side, i, 0], at[side, i, 1], at[side, i, 2]
+            wx, wy, wz = at[side, j, 0], at[side, j, 1], at[side, j, 2]
+            nx, ny, nz = face_vector((x, y, z), (vx, vy, vz), (wx, wy, wz))
             if normal[side, i, 3] == 0.0:
                 if nx == 0.0 and ny == 0.0 and nz == 0.0:
                     return True
             elif turn_exceeds(
-                normal[side, i, 0], normal[side, i, 1], normal[side, i, 2], nx, ny, nz, cosine
+                (normal[side, i, 0], normal[side, i, 1], normal[side, i, 2]), (nx, ny, nz), cosine
             ):
                 return True
             if kind >= CURVE and mesh.kind[v] >= CURVE and mesh.kind[w] >= CURVE:
@@ -144,7 +151,7 @@ def collapse_makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
 
 @inlined
 def _worst_shape(X, x, y, z, v, w, opposite):
-    nx, ny, nz = face_vector(x, y, z, X[v, 0], X[v, 1], X[v, 2], X[w, 0], X[w, 1], X[w, 2])
+    nx, ny, nz = face_vector((x, y, z), point(X, v), point(X, w))
     lv = (X[v, 0] - x) ** 2 + (X[v, 1] - y) ** 2 + (X[v, 2] - z) ** 2
     lw = (X[w, 0] - x) ** 2 + (X[w, 1] - y) ** 2 + (X[w, 2] - z) ** 2
     return mean_ratio(lv, lw, opposite, sqrt(nx * nx + ny * ny + nz * nz))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.compiler import inlined, threaded
-from ..core.geometry import face_vector
+from ..core.geometry import area_vector
 from ..core.vocabulary import (
     CURVE,
     DEAD,
@@ -125,9 +125,7 @@ def _ring_normal(mesh, X, v):
     for _ in range(MAX_VALENCE):
         b = mesh.origin[next_halfedge(h)]
         c = mesh.origin[previous_halfedge(h)]
-        nx, ny, nz = face_vector(
-            X[v, 0], X[v, 1], X[v, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-        )
+        nx, ny, nz = area_vector(X, v, b, c)
         sx += nx
         sy += ny
         sz += nz

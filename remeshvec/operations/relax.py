@@ -15,7 +15,7 @@ from math import sqrt
 import numpy as np
 
 from ..core.compiler import add_four, add_row, inlined, threaded
-from ..core.geometry import SHARP, face_vector, mixed_voronoi_areas, tangent_basis
+from ..core.geometry import SHARP, area_vector, mixed_voronoi_areas, tangent_basis
 from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, Mesh
 from ..mesh.blocks import list_range, per_block, per_stage_block, stages, vertex_range
 
@@ -161,9 +161,7 @@ def _sum_rings_across(span, mesh, blocks, stage, stiffness, weighted, across, co
 @inlined
 def _add_face(X, weighted, a, b, c, stiffness, sums):
     """Add a face to the sums of its corners; its half-edges bring each the neighbour they end at."""
-    nx, ny, nz = face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
+    nx, ny, nz = area_vector(X, a, b, c)
     add_row(sums, a, weighted, b)
     add_row(sums, b, weighted, c)
     add_row(sums, c, weighted, a)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.compiler import threaded
-from ..core.geometry import face_vector, turn_exceeds
+from ..core.geometry import area_vector, turn_exceeds
 from ..core.vocabulary import CURVE, DEAD, INNER, Blocks, FloatArray, Mesh
 from ..mesh.blocks import per_block
 
@@ -76,15 +76,9 @@ def _find_folds(span, mesh, blocks, before, faces, n_faces, marked, found):
             a = mesh.origin[3 * f]
             b = mesh.origin[3 * f + 1]
             c = mesh.origin[3 * f + 2]
-            ux, uy, uz = face_vector(
-                before[a, 0], before[a, 1], before[a, 2],
-                before[b, 0], before[b, 1], before[b, 2],
-                before[c, 0], before[c, 1], before[c, 2],
-            )  # fmt: skip
-            wx, wy, wz = face_vector(
-                X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-            )
-            if ux * ux + uy * uy + uz * uz > 0.0 and turn_exceeds(ux, uy, uz, wx, wy, wz, _COSINE):
+            old = ux, uy, uz = area_vector(before, a, b, c)
+            new = area_vector(X, a, b, c)
+            if ux * ux + uy * uy + uz * uz > 0.0 and turn_exceeds(old, new, _COSINE):
                 marked[a] = 1
                 marked[b] = 1
                 marked[c] = 1

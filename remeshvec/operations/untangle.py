@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import inlined, threaded
-from ..core.geometry import distance_squared, face_vector, tangent_basis, turn_exceeds
+from ..core.geometry import distance_squared, face_vector, point, tangent_basis, turn_exceeds
 from ..core.vocabulary import DEAD, INNER, NONE, Blocks, IndexArray, Mesh, Tree
 from ..mesh.blocks import DONE, list_range, per_block, per_stage_block, stages, vertex_range
 from ..mesh.walk import next_halfedge, previous_halfedge
@@ -252,11 +252,9 @@ def _cost(ring, n, x, y, z, x0, y0, z0, weight, scale, tree, face):
         worst = max(worst, cosine)
         if x != x0 or y != y0 or z != z0:
             j = i - 1 if i > 0 else n - 1
-            ox, oy, oz = face_vector(
-                x0, y0, z0, ring[j, 0], ring[j, 1], ring[j, 2], ring[i, 0], ring[i, 1], ring[i, 2]
-            )
+            ox, oy, oz = face_vector((x0, y0, z0), point(ring, j), point(ring, i))
             nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
-            if ox * ox + oy * oy + oz * oz > 0.0 and turn_exceeds(ox, oy, oz, nx, ny, nz, 0.5):
+            if ox * ox + oy * oy + oz * oz > 0.0 and turn_exceeds((ox, oy, oz), (nx, ny, nz), 0.5):
                 return 1e30
         px, py, pz, pp = qx, qy, qz, qq
     return worst

@@ -16,7 +16,7 @@ from ..core.compiler import kernel
 from ..core.geometry import closest_on_segment
 from ..core.vocabulary import CURVE, DEAD, FIXED, NON_MANIFOLD, NONE, FloatArray, IndexArray, Mesh
 from ..mesh.walk import ends_of
-from ..reference.bvh import face_distance, walk_to
+from ..reference.bvh import corner, face_distance, walk_to
 from .records import Births, IntArray, Provenance
 
 __all__ = ["locate_corners"]
@@ -294,11 +294,10 @@ def _find_paths(tree, X, vertices, beside, near, face, seen, length):
                 a = 3 * e
                 b = 3 * ((e + 1) % 3)
                 px, py, pz = entry[k, 0], entry[k, 1], entry[k, 2]
+                middle = 0.5 * (px + x), 0.5 * (py + y), 0.5 * (pz + z)
                 s, _ = closest_on_segment(
-                    0.5 * (px + x), 0.5 * (py + y), 0.5 * (pz + z),
-                    tree.corners[f, a], tree.corners[f, a + 1], tree.corners[f, a + 2],
-                    tree.corners[f, b], tree.corners[f, b + 1], tree.corners[f, b + 2],
-                )  # fmt: skip
+                    middle, corner(tree.corners, f, e), corner(tree.corners, f, (e + 1) % 3)
+                )
                 squared = 0.0
                 for c in range(3):
                     start, end = tree.corners[f, a + c], tree.corners[f, b + c]

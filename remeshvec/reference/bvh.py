@@ -25,6 +25,7 @@ __all__ = [
     "closest_face",
     "closest_faces",
     "closest_points",
+    "corner",
     "face_distance",
     "point_on_face",
     "search_face",
@@ -157,14 +158,16 @@ def _box_distance(boxes, i, x, y, z):
 
 
 @inlined
+def corner(corners, f, c):
+    """Return the coordinates of corner ``c`` of a face as a tuple."""
+    return corners[f, 3 * c], corners[f, 3 * c + 1], corners[f, 3 * c + 2]
+
+
+@inlined
 def face_distance(corners, f, x, y, z):
     """Barycentric weights of corners 1 and 2 of the closest point of a face; squared distance."""
-    return closest_on_triangle(
-        x, y, z,
-        corners[f, 0], corners[f, 1], corners[f, 2],
-        corners[f, 3], corners[f, 4], corners[f, 5],
-        corners[f, 6], corners[f, 7], corners[f, 8],
-    )  # fmt: skip
+    a, b, c = corner(corners, f, 0), corner(corners, f, 1), corner(corners, f, 2)
+    return closest_on_triangle((x, y, z), a, b, c)
 
 
 @inlined
@@ -276,11 +279,8 @@ def search_face(tree, x, y, z, face, nx, ny, nz, stack):
 
 @inlined
 def _looks_away(corners, f, nx, ny, nz):
-    mx, my, mz = face_vector(
-        corners[f, 0], corners[f, 1], corners[f, 2],
-        corners[f, 3], corners[f, 4], corners[f, 5],
-        corners[f, 6], corners[f, 7], corners[f, 8],
-    )  # fmt: skip
+    a, b, c = corner(corners, f, 0), corner(corners, f, 1), corner(corners, f, 2)
+    mx, my, mz = face_vector(a, b, c)
     return mx * nx + my * ny + mz * nz < 0.0
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel
-from ..core.geometry import face_vector
+from ..core.geometry import area_vector
 from ..core.vocabulary import FloatArray, IndexArray
 from ..errors import OptionError
 from .curvature import largest_curvature
@@ -235,9 +235,7 @@ def _integrate_density(X, origin, lengths):
     total = 0.0
     for f in range(origin.size // 3):
         a, b, c = origin[3 * f], origin[3 * f + 1], origin[3 * f + 2]
-        x, y, z = face_vector(
-            X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-        )
+        x, y, z = area_vector(X, a, b, c)
         area = 0.5 * sqrt(x * x + y * y + z * z)
         total += area * _mean_density(lengths[a], lengths[b], lengths[c])
     return total

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel
-from ..core.geometry import distance_squared, face_vector, tangent_basis
+from ..core.geometry import area_vector, distance_squared, tangent_basis
 from ..core.vocabulary import NONE, FloatArray, IndexArray
 from ..mesh.walk import next_halfedge, previous_halfedge
 
@@ -155,9 +155,7 @@ def _average_normals(X, origin, part, reach, means, weights):
             reach[p, 0] = _REACH * exp(reach[p, 0] / reach[p, 1])
     for f in range(origin.size // 3):
         a, b, c = origin[3 * f], origin[3 * f + 1], origin[3 * f + 2]
-        nx, ny, nz = face_vector(
-            X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-        )
+        nx, ny, nz = area_vector(X, a, b, c)
         area = sqrt(nx * nx + ny * ny + nz * nz)
         for h in range(3 * f, 3 * f + 3):
             v = origin[h]
@@ -215,11 +213,7 @@ def _differentiate(part, reach, means, weights, shapes):
     """
     for f in range(part.size // 3):
         a, b, c = part[3 * f], part[3 * f + 1], part[3 * f + 2]
-        ux, uy, uz = face_vector(
-            means[a, 0], means[a, 1], means[a, 2],
-            means[b, 0], means[b, 1], means[b, 2],
-            means[c, 0], means[c, 1], means[c, 2],
-        )  # fmt: skip
+        ux, uy, uz = area_vector(means, a, b, c)
         area = sqrt(ux * ux + uy * uy + uz * uz)
         if area == 0.0 or min(means[a, 6], means[b, 6], means[c, 6]) == 0.0:
             weights[3 * f : 3 * f + 3] = 0.0

@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 
 from ..core.compiler import inlined, kernel
-from ..core.geometry import distance_squared, face_vector
+from ..core.geometry import area_vector, distance_squared
 from ..core.vocabulary import NONE, FloatArray, IndexArray
 from ..mesh.walk import next_halfedge, previous_halfedge
 
@@ -133,9 +133,7 @@ def _turned_gradient(X, u, a, b, c):
     It is the sum of ``u`` times opposite edges, so its product with an edge is, up to a positive factor,
     the slope towards the opposite vertex.
     """
-    x, y, z = face_vector(
-        X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-    )
+    x, y, z = area_vector(X, a, b, c)
     p, q = u[b] - u[a], u[c] - u[a]
     return (
         p * (X[a, 0] - X[c, 0]) + q * (X[b, 0] - X[a, 0]),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import threaded
-from ..core.geometry import distance_squared, face_vector
+from ..core.geometry import area_vector, distance_squared
 from ..core.vocabulary import DEAD, FROZEN, FloatArray, IndexArray, Mesh
 from ..errors import MeshInputError, OptionError
 from ..features.creases import find_creases
@@ -315,9 +315,7 @@ def _sum_sizes(span, mesh, sums):
             a = mesh.origin[3 * f]
             b = mesh.origin[3 * f + 1]
             c = mesh.origin[3 * f + 2]
-            nx, ny, nz = face_vector(
-                X[a, 0], X[a, 1], X[a, 2], X[b, 0], X[b, 1], X[b, 2], X[c, 0], X[c, 1], X[c, 2]
-            )
+            nx, ny, nz = area_vector(X, a, b, c)
             face_area = 0.5 * sqrt(nx * nx + ny * ny + nz * nz)
             area += face_area
             flat += face_area == 0.0
