@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from test_html_report import NASTY, TRIANGLE, shape, twenty_thousand
 
-from remeshvec import html_page, html_report, remesh, write_html
+from remeshvec import html_report, remesh, write_html
 from remeshvec.html_page import views as _page_views
+from remeshvec.html_page.page import _page_frame
 
 pytest.importorskip("plotly")
 Image = pytest.importorskip("PIL.Image")
@@ -212,7 +213,7 @@ def test_views_without_edges_are_drawn(chromium, result, tmp_path, monkeypatch):
 
 def test_the_frame_of_a_notebook_is_drawn(chromium, result, tmp_path):
     """Its policy and its sandbox let the page draw."""
-    frame = html_page._page_frame(html_report(result))
+    frame = _page_frame(html_report(result))
     content = f"<!DOCTYPE html><html data-state='framed'><body>{frame}</body></html>"
     (tmp_path / "a.html").write_text(content, "utf-8")
     chromium.open((tmp_path / "a.html").as_uri())

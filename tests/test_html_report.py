@@ -23,6 +23,7 @@ from remeshvec.cli.command import main
 from remeshvec.errors import MeshFormatError, OptionError, RemeshvecError
 from remeshvec.files.plain import write_mesh
 from remeshvec.html_page import views as _page_views
+from remeshvec.html_page.page import _page_json
 from remeshvec.measures.quality import elements, quality
 
 pytest.importorskip("plotly")
@@ -150,7 +151,7 @@ def test_names_cannot_break_out(result):
     assert "alert('a" not in rest and html.escape(NASTY) in rest
     assert rest.count("<script") == rest.count("</script>") == 3
     page.encode()
-    assert html_page._page_json(["</script><!--"]) == '["\\u003c/script\\u003e\\u003c!--"]'
+    assert _page_json(["</script><!--"]) == '["\\u003c/script\\u003e\\u003c!--"]'
 
 
 def test_nothing_is_loaded(result):

@@ -36,9 +36,12 @@ BAD = {
     "boundary array": ({"boundary": np.array(["free"])}, r"boundary must be one of"),
     "vertex too large": (
         {"fixed_vertices": [0, 20]},
-        r"fixed_vertices\[1\] = 20 is no vertex index; they run from 0 to 19",
+        r"fixed_vertices\[1\] = 20 is not a vertex index; they run from 0 to 19",
     ),
-    "vertex negative": ({"fixed_vertices": [-1]}, r"fixed_vertices\[0\] = -1 is no vertex index"),
+    "vertex negative": (
+        {"fixed_vertices": [-1]},
+        r"fixed_vertices\[0\] = -1 is not a vertex index",
+    ),
     "vertex float": (
         {"fixed_vertices": [1.0]},
         r"fixed_vertices must hold vertex indices; got shape \(1,\) of float64",
@@ -53,22 +56,22 @@ BAD = {
     ),
     "vertex ragged": (
         {"fixed_vertices": [[0], [1, 2]]},
-        r"fixed_vertices is no rectangular array",
+        r"fixed_vertices is not a rectangular array",
     ),
     "vertex object": (
         {"fixed_vertices": [None]},
-        r"fixed_vertices is no rectangular array of numbers",
+        r"fixed_vertices is not a rectangular array of numbers",
     ),
     "face too large": (
         {"fixed_faces": [3, 24]},
-        r"fixed_faces\[1\] = 24 is no face index; they run from 0 to 23",
+        r"fixed_faces\[1\] = 24 is not a face index; they run from 0 to 23",
     ),
     "face mask": (
         {"fixed_faces": np.ones(5, bool)},
         r"fixed_faces as a mask must have shape \(24,\); got \(5,\)",
     ),
     "face float": ({"fixed_faces": [0.5]}, r"fixed_faces must hold face indices"),
-    "selection": ({"selection": [24]}, r"selection\[0\] = 24 is no face index"),
+    "selection": ({"selection": [24]}, r"selection\[0\] = 24 is not a face index"),
     "selection mask": (
         {"selection": np.ones((24, 1), bool)},
         r"selection as a mask must have shape \(24,\); got \(24, 1\)",
@@ -85,7 +88,7 @@ BAD = {
     ),
     "edge too large": (
         {"feature_edges": [[0, 1], [1, 20]]},
-        r"feature_edges.* = 20 is no vertex index",
+        r"feature_edges.* = 20 is not a vertex index",
     ),
     "edge that is none": ({"feature_edges": [[0, 1], [0, 19]]}, r"feature_edges.*\b1\b"),
     "edge of one vertex": ({"feature_edges": [[3, 3]]}, r"feature_edges"),

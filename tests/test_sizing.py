@@ -117,9 +117,7 @@ def test_the_shortest_length_keeps_tips_from_exploding():
 def test_bad_bounds_are_refused(name, bad):
     if bad is None and name != "tolerance":
         return
-    with pytest.raises(
-        OptionError, match=rf"^{name} must be a positive number in the units of V; got"
-    ):
+    with pytest.raises(OptionError, match=rf"^{name} must be a positive number of units of V; got"):
         Adaptive(**{"tolerance": 0.1, name: bad})
 
 
@@ -145,7 +143,7 @@ def test_numbers_stay_numbers(value):
 
 @pytest.mark.parametrize("value", [0, -1, np.nan, -np.inf, True, False, 10**400, Fraction(-1, 2)])
 def test_bad_numbers(value):
-    with pytest.raises(OptionError, match=r"^L must be a positive length in the units of V; got"):
+    with pytest.raises(OptionError, match=r"^L must be a positive number of units of V; got"):
         target_lengths(P, value)
 
 

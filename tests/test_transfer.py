@@ -354,7 +354,10 @@ def test_threads_change_nothing(threads):
         (lambda r: r.transfer(r.transfer_back(r.V), method="cubic"), "method must be one of"),
         (lambda r: r.transfer(np.array(["a"] * 25), method="linear"), "cannot be added up"),
         (lambda r: r.matrix("edges"), "on must be one of"),
-        (lambda r: r.transfer_back(r.V, on="corners"), '"vertices" or "faces"'),
+        (
+            lambda r: r.transfer_back(r.V, on="corners"),
+            "on must be one of vertices, faces; got 'corners'",
+        ),
         (lambda r: r.transfer_back(np.zeros(2)), "vertices must have shape"),
     ],
 )

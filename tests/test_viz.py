@@ -10,6 +10,7 @@ import pytest
 
 from remeshvec import viz
 from remeshvec.errors import MeshFormatError, RemeshvecError
+from remeshvec.viz import pictures
 
 TETRAHEDRON = (
     np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]),
@@ -89,12 +90,14 @@ def test_degenerate_mesh_is_drawn(pyvista, tmp_path):
 
 def test_camera_sees_the_broad_side_from_the_front():
     board = box((4, 2, 0.1))
-    camera = viz.three_quarter_view(*board, viz.UP["y"])
+    camera = viz.three_quarter_view(*board, pictures.UP["y"])
     assert camera.eye[2] > 0.8 and camera.eye[1] > 0.2
     np.testing.assert_allclose(np.cross(camera.right, camera.up), camera.eye, atol=1e-12)
-    assert viz.three_quarter_view(*box((4, 0.1, 4)), viz.UP["y"]).eye[1] > 0.7  # a map, from above
     assert (
-        viz.three_quarter_view(*box((4, 0.1, 2)), viz.UP["z"]).eye[1] < -0.8
+        viz.three_quarter_view(*box((4, 0.1, 4)), pictures.UP["y"]).eye[1] > 0.7
+    )  # a map, from above
+    assert (
+        viz.three_quarter_view(*box((4, 0.1, 2)), pictures.UP["z"]).eye[1] < -0.8
     )  # y points away from us
 
 

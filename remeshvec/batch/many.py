@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sized
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..core.check import positive_count, positive_number
+from ..core import arguments
 from ..core.threads import available_threads
 from ..errors import BatchError, OptionError
 from ..files.plain import MeshFile, read_mesh
@@ -109,20 +109,21 @@ def remesh_many(
     >>> for item in remesh_many(paths, 0.1, on_error="collect"):  # doctest: +SKIP
     ...     print(item.name, item.error or len(item.result.F))
     """
-    _check(on_error, options.keys())
+    arguments.choice(on_error, "on_error", ("raise", "collect"))
+    ordered, progress = arguments.flag(ordered, "ordered"), arguments.flag(progress, "progress")
     if workers is not None:
-        workers = positive_count(workers, "workers")
+        workers = arguments.count(workers, "workers")
     if timeout is not None:
-        timeout = positive_number(timeout, "timeout", "seconds")
-    if isinstance(items, str | bytes):
-        raise OptionError(f"items must be many; for one of them say [{items!r}]")
+        timeout = arguments.number(timeout, "timeout", above=0.0, unit="seconds")
+    _check_names(options)
+    meshes = _iterator(items)
     total = len(items) if isinstance(items, Sized) else None
     workers = workers or available_threads()
     is_here = workers == 1 and timeout is None
     if total:
         workers = min(workers, total)  # so that few large meshes get all cores
     crew = _Crew(workers, is_here, ordered, timeout)
-    done = _with_names(iter(items), {"L": L, **options}, crew)
+    done = _with_names(meshes, {"L": L, **options}, crew)
     if on_error == "raise":
         done = _raising(done)
     return bar(done, total, lambda item: item.error is not None) if progress else done
@@ -137,10 +138,20 @@ class _Crew(NamedTuple):
     timeout: float | None
 
 
-def _check(on_error: str, options: Iterable[str]) -> None:
-    """Refuse here what would fail for every item."""
-    if on_error not in ("raise", "collect"):
-        raise OptionError(f'on_error must be "raise" or "collect"; got {on_error!r}')
+def _iterator(items: Any) -> Iterator[Any]:
+    """Iterate over many meshes, and refuse a single one."""
+    if isinstance(items, str | bytes | os.PathLike | MeshFile | RemeshResult):
+        raise OptionError("items must be many meshes; put a single one into a list: [mesh]")
+    try:
+        return iter(items)
+    except TypeError:
+        raise OptionError(
+            f"items must be an iterable of meshes; got an object of type {type(items).__name__}"
+        ) from None
+
+
+def _check_names(options: Iterable[str]) -> None:
+    """Refuse options that do not exist, which would fail for every item."""
     known = inspect.signature(remesh).parameters.keys() - {"V", "F", "L", "return_result"}
     unknown = sorted(set(options) - known)
     if unknown:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..core import arguments
 from ..files.plain import PATHS
 from ..files.with_data import check_data_writable, read_data, write_data
 from ..interop.mesh_data import MeshData, carry
@@ -39,6 +40,7 @@ def remesh_file(
     MeshFormatError
         A file cannot be read or written.
     """
+    source, target = arguments.path(source, "source"), arguments.path(target, "target")
     check_data_writable(target)
     data, _ = read_data(source)
     result = remesh(data.V, data.F, L, **with_feature_data(data, options))

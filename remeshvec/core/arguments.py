@@ -1,10 +1,14 @@
-"""Checks of plain arguments: numbers, counts, flags, words, functions; one wording for all of them."""
+"""Checks of plain arguments: numbers, counts, flags, words, texts, paths, functions.
+
+All of them raise `OptionError` in one wording: the name, what is allowed, what was given.
+"""
 
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterable
-from math import isfinite
+from math import inf, isfinite, nan
 from numbers import Real
 from typing import Any
 
@@ -12,7 +16,9 @@ import numpy as np
 
 from ..errors import OptionError
 
-__all__ = ["choice", "count", "flag", "function", "number"]
+__all__ = ["choice", "count", "flag", "function", "number", "path", "text"]
+
+_MOST_SHOWN = 80  # characters of a wrong value in a message
 
 
 def number(
@@ -44,17 +50,34 @@ def number(
     ------
     OptionError
     """
-    is_number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
-    if is_number and isfinite(value):
-        x = float(value)
-        if (
-            (above is None or x > above)
-            and (low is None or x >= low)
-            and (below is None or x < below)
-            and (high is None or x <= high)
-        ):
-            return x
-    raise OptionError(f"{name} must be {_range(above, low, below, high, unit)}; got {value!r}")
+    x = _as_float(value)
+    if (
+        isfinite(x)
+        and (above is None or x > above)
+        and (low is None or x >= low)
+        and (below is None or x < below)
+        and (high is None or x <= high)
+    ):
+        return x
+    raise OptionError(
+        f"{name} must be {_range(above, low, below, high, unit)}; got {_shown(value)}"
+    )
+
+
+def _as_float(value: Any) -> float:
+    """Return a real number as a float; NaN for anything else, infinity for numbers beyond all floats."""
+    if not isinstance(value, Real) or isinstance(value, bool | np.bool_):
+        return nan
+    try:
+        return float(value)
+    except OverflowError:
+        return inf
+
+
+def _shown(value: Any) -> str:
+    """Show a value in one line of bounded length."""
+    line = " ".join(repr(value).split())
+    return line if len(line) <= _MOST_SHOWN else line[: _MOST_SHOWN - 3] + "..."
 
 
 def _range(
@@ -81,14 +104,14 @@ def count(value: Any, name: str, *, low: int = 1) -> int:
     """Check a whole number that is at least ``low``, and return it as an int."""
     is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool | np.bool_)
     if not is_whole or value < low:
-        raise OptionError(f"{name} must be a whole number, at least {low}; got {value!r}")
+        raise OptionError(f"{name} must be a whole number, at least {low}; got {_shown(value)}")
     return int(value)
 
 
 def flag(value: Any, name: str) -> bool:
     """Check True or False; 0, 1 and strings are neither."""
     if not isinstance(value, bool | np.bool_):
-        raise OptionError(f"{name} must be True or False; got {value!r}")
+        raise OptionError(f"{name} must be True or False; got {_shown(value)}")
     return bool(value)
 
 
@@ -99,11 +122,26 @@ def choice(value: Any, name: str, words: Iterable[str]) -> str:
         return value
     near = difflib.get_close_matches(value, known, 1) if isinstance(value, str) else []
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise OptionError(f"{name} must be one of {', '.join(known)}; got {value!r}{hint}")
+    raise OptionError(f"{name} must be one of {', '.join(known)}; got {_shown(value)}{hint}")
+
+
+def text(value: Any, name: str) -> str:
+    """Check a string."""
+    if not isinstance(value, str):
+        raise OptionError(f"{name} must be a string; got {_shown(value)}")
+    return value
+
+
+def path(value: Any, name: str) -> str:
+    """Check the path of a file, and return it as a string; whether the file is there is not asked."""
+    found = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(found, str):
+        raise OptionError(f"{name} must be the path of a file; got {_shown(value)}")
+    return found
 
 
 def function(value: Any, name: str) -> Any:
     """Check something that can be called."""
     if not callable(value):
-        raise OptionError(f"{name} must be callable; got {value!r}")
+        raise OptionError(f"{name} must be callable; got {_shown(value)}")
     return value

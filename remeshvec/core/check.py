@@ -1,4 +1,4 @@
-"""Casting of the caller's arrays, and the wording of input errors."""
+"""Checks and casts of the caller's arrays, and the wording of input errors."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import MeshInputError, OptionError
+from ..errors import MeshInputError, OptionError, RemeshvecError
 
 __all__ = [
     "as_array",
@@ -22,70 +22,81 @@ __all__ = [
     "which",
 ]
 
+_NO_ARRAY = "is not a rectangular array of numbers (rows of unequal length?)"
 
-def as_mesh(V: ArrayLike, F: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+
+def as_mesh(
+    V: ArrayLike, F: ArrayLike, names: tuple[str, str] = ("V", "F")
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Check and cast a triangle mesh.
 
     Parameters
     ----------
     V : (n, 3) float or int, array or nested lists
     F : (m, 3) int, array or nested lists
+    names : (str, str)
+        What the caller's arguments are called, for messages.
 
     Returns
     -------
     V : (n, 3) float64, C-contiguous
-        The caller's own array where it is one already: never write to it.
+        The caller's own array if it needs no cast: never write to it.
     F : (m, 3) int64, C-contiguous
         Likewise.
 
     Raises
     ------
     MeshInputError
-        Wrong shape or dtype, no faces, a vertex of a face that is not finite or does not exist.
+        The shape or the dtype is wrong, there are no faces, or a face names a vertex that is not finite
+        or does not exist.
     """
-    vertices = as_vertices(V)
-    faces = as_faces(F, len(vertices))
-    _check_finite(vertices, faces)
+    vertices = as_vertices(V, names[0])
+    faces = as_faces(F, len(vertices), names[1])
+    _check_finite(vertices, faces, names[0])
     return vertices, faces
 
 
-def as_vertices(V: ArrayLike) -> NDArray[np.float64]:
+def as_vertices(V: ArrayLike, name: str = "V") -> NDArray[np.float64]:
     """Cast to (n, 3) float64."""
-    array = _as_array(V, "V")
+    array = as_array(V, name, MeshInputError)
     if array.ndim == 2 and array.shape[1] == 2:
         raise MeshInputError(
-            f"V has shape {array.shape}, two coordinates a vertex; "
-            "add a third: np.column_stack([V, np.zeros(len(V))])"
+            f"{name} has shape {array.shape}, two coordinates per vertex; "
+            f"add a third: np.column_stack([{name}, np.zeros(len({name}))])"
         )
     if array.ndim != 2 or array.shape[1] != 3:
-        raise MeshInputError(f"V must have shape (n, 3), one vertex a row; got {array.shape}")
+        raise MeshInputError(
+            f"{name} must have shape (n, 3), one vertex per row; got {array.shape}"
+        )
     if array.dtype.kind not in "fiu":
-        raise MeshInputError(f"V must hold real numbers; got dtype {array.dtype}")
+        raise MeshInputError(f"{name} must hold real numbers; got dtype {array.dtype}")
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
-def as_faces(F: ArrayLike, n_vertices: int) -> NDArray[np.int64]:
+def as_faces(F: ArrayLike, n_vertices: int, name: str = "F") -> NDArray[np.int64]:
     """Cast to (m, 3) int64 with indices in ``range(n_vertices)``."""
-    array = _as_array(F, "F")
+    array = as_array(F, name, MeshInputError)
     if array.size == 0:
-        raise MeshInputError("F is empty: the mesh has no faces")
+        raise MeshInputError(f"{name} is empty: the mesh has no faces")
     if array.ndim == 2 and array.shape[1] > 3:
         raise MeshInputError(
-            f"F has shape {array.shape}: polygons with {array.shape[1]} corners; "
+            f"{name} has shape {array.shape}: polygons with {array.shape[1]} corners; "
             "triangulate them first"
         )
     if array.ndim != 2 or array.shape[1] != 3:
-        raise MeshInputError(f"F must have shape (m, 3), one triangle a row; got {array.shape}")
+        raise MeshInputError(
+            f"{name} must have shape (m, 3), one triangle per row; got {array.shape}"
+        )
     if array.dtype.kind == "f" and np.isfinite(array).all() and (array == np.rint(array)).all():
         array = array.astype(np.int64)
     if array.dtype.kind not in "iu":
-        raise MeshInputError(f"F must hold integer vertex indices; got dtype {array.dtype}")
+        raise MeshInputError(f"{name} must hold integer vertex indices; got dtype {array.dtype}")
     faces = np.ascontiguousarray(array, dtype=np.int64)
     if faces.view(np.uint64).max() >= n_vertices:  # or negative
         low, high = int(array.min()), int(array.max())
         bad = np.flatnonzero(((array < 0) | (array >= n_vertices)).any(axis=1))
         raise MeshInputError(
-            f"{which(bad, 'face')} of F name vertices outside 0 to {n_vertices - 1} "
+            f"{which(bad, 'face')} of {name} name vertices outside 0 to {n_vertices - 1} "
             f"(indices run from {low} to {high}); indices are 0-based"
         )
     return faces
@@ -107,7 +118,7 @@ def positive_number(value: Any, name: str, unit: str) -> float:
 
 
 def as_mask(value: Any, count: int, name: str, noun: str) -> NDArray[np.bool_]:
-    """Mask of faces or vertices from a mask or from indices, a copy."""
+    """Return a new mask of faces or vertices, from a mask or from indices."""
     array = as_array(value, name)
     if array.dtype == np.bool_:
         if array.shape != (count,):
@@ -119,7 +130,7 @@ def as_mask(value: Any, count: int, name: str, noun: str) -> NDArray[np.bool_]:
 
 
 def as_indices(value: Any, count: int, name: str, noun: str) -> NDArray[np.int64]:
-    """Check the indices that an option gives."""
+    """Check an option that holds indices below ``count``."""
     array = as_array(value, name)
     if array.size == 0:
         return np.empty(0, np.int64)
@@ -130,44 +141,34 @@ def as_indices(value: Any, count: int, name: str, noun: str) -> NDArray[np.int64
     bad = np.flatnonzero((array < 0) | (array >= count))
     if len(bad):
         raise OptionError(
-            f"{name}[{bad[0]}] = {array[bad[0]]} is no {noun} index; they run from 0 to {count - 1}"
+            f"{name}[{bad[0]}] = {array[bad[0]]} is not a {noun} index; they run from 0 to {count - 1}"
         )
     return array.astype(np.int64)
 
 
-def as_array(value: Any, name: str) -> NDArray[Any]:
-    """Check that an option is an array of numbers, or a tensor."""
+def as_array(value: Any, name: str, error: type[RemeshvecError] = OptionError) -> NDArray[Any]:
+    """Check that an argument is an array of numbers, a tensor or nested lists; raises ``error``."""
     try:
         array = np.asarray(value.detach().cpu() if hasattr(value, "detach") else value)
-    except (ValueError, TypeError) as error:
-        raise OptionError(f"{name} is no rectangular array: {error}") from error
+    except (ValueError, TypeError) as problem:
+        raise error(f"{name} {_NO_ARRAY}") from problem
     if array.dtype == object:
-        raise OptionError(f"{name} is no rectangular array of numbers")
+        raise error(f"{name} {_NO_ARRAY}")
     return array
 
 
-def _check_finite(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
-    """Refuse NaN and infinity, but for vertices that no face uses."""
+def _check_finite(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> None:
+    """Refuse NaN and infinity, except at vertices that no face uses."""
     with np.errstate(invalid="ignore", over="ignore"):
-        if np.isfinite(V.sum()):  # 5 times faster than to look at each
+        if np.isfinite(V.sum()):  # 5 times faster than a look at each number
             return
     is_bad = ~np.isfinite(V).all(axis=1)
     bad = np.flatnonzero(is_bad & (np.bincount(F.ravel(), minlength=len(V)) > 0))
     if len(bad):
         raise MeshInputError(
-            f"{which(bad, 'vertex')} of V are NaN or infinite; "
+            f"{which(bad, 'vertex')} of {name} are NaN or infinite; "
             "remove them and their faces, or repair the coordinates"
         )
-
-
-def _as_array(value: ArrayLike, name: str) -> NDArray[Any]:
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError) as error:
-        raise MeshInputError(f"{name} is no rectangular array: {error}") from error
-    if array.dtype == object:
-        raise MeshInputError(f"{name} is no rectangular array of numbers (rows of unequal length?)")
-    return array
 
 
 def which(indices: NDArray[np.intp], noun: str) -> str:

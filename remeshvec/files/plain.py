@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core import arguments
 from ..errors import MeshFormatError
 from .guards import MeshCopy, check_obj, check_off, check_stl, checked_bytes
 from .ply_guard import check_ply, parse_header
@@ -94,7 +95,7 @@ def read_mesh(path: PATHS) -> MeshFile:
     Binary PLY files whose faces differ in their number of corners, and PLY files with unusual
     columns, need the package plyfile.
     """
-    path = Path(path)
+    path = Path(arguments.path(path, "path"))
     try:
         reader = _READERS[_known_suffix(path)]
         raw = reader(checked_bytes(path))
@@ -130,7 +131,7 @@ def write_mesh(path: PATHS, V: ArrayLike, F: ArrayLike) -> None:
     MeshFormatError
         The suffix is unknown, the mesh is not valid, or the file cannot be written.
     """
-    path = Path(path)
+    path = Path(arguments.path(path, "path"))
     try:
         to_bytes = WRITERS[_known_suffix(path)]
         content = to_bytes(*_checked_mesh(_Raw(np.asarray(V), np.asarray(F), 0)))

@@ -21,12 +21,14 @@ from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
+from ..core import arguments
 from ..core.version import __version__
 from ..errors import OptionError, RemeshvecError
 from ..files.plain import check_writable, write_file
 from ..measures.quality import Quality, elements
+from ..viz.pictures import UP
 from .charts import build_charts
 from .views import build_views
 
@@ -82,10 +84,10 @@ def html_report(result: RemeshResult, *, title: str = "", command: str = "", up:
     OptionError
         `up` is no such axis.
     """
-    if up not in ("y", "z"):
-        raise OptionError(f"up must be 'y' or 'z'; got {up!r}")
+    report = _report_of(result)
+    up = arguments.choice(up, "up", UP)
+    title, command = arguments.text(title, "title"), arguments.text(command, "command")
     plotly = require_plotly()
-    report = result.report
     qualities = (report.quality_before, report.quality_after)
     measured = (elements(*report.before), elements(*report.after))
     views = build_views(measured, qualities, report.target_length, up)
@@ -144,7 +146,7 @@ def write_html(
     OptionError
         `up` is no such axis.
     """
-    check_writable(path, PAGE_SUFFIXES)
+    check_writable(arguments.path(path, "path"), PAGE_SUFFIXES)
     page = html_report(result, title=title, command=command, up=up)
     write_file(path, page.encode())
 
@@ -180,6 +182,16 @@ def require_plotly() -> Any:
         return importlib.import_module("plotly.offline")
     except ImportError as error:
         raise PlotlyMissingError("HTML pages need Plotly: pip install 'remeshvec[html]'") from error
+
+
+def _report_of(result: Any) -> Report:
+    """Return the report of a result; the type itself stands above this folder."""
+    report = getattr(result, "report", None)
+    if not hasattr(report, "quality_after"):
+        raise OptionError(
+            f"result must be a RemeshResult; got an object of type {type(result).__name__}"
+        )
+    return cast("Report", report)
 
 
 def _is_in_notebook() -> bool:

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.arguments import count
 from ..core.check import as_mesh
-from ..errors import OptionError
 
 __all__ = ["SurfaceDistance", "surface_distance"]
 
@@ -86,9 +86,8 @@ def surface_distance(
     OptionError
         `samples` is less than 1.
     """
-    if samples < 1:
-        raise OptionError(f"samples must be at least 1, got {samples}")
-    first, second = as_mesh(V1, F1), as_mesh(V2, F2)
+    samples = count(samples, "samples")
+    first, second = as_mesh(V1, F1, ("V1", "F1")), as_mesh(V2, F2, ("V2", "F2"))
     max_12, rms_12, mean_12 = _one_sided(*first, *second, samples)
     max_21, rms_21, mean_21 = _one_sided(*second, *first, samples)
     diagonal = float(np.linalg.norm(np.ptp(first[0][np.unique(first[1])], axis=0)))

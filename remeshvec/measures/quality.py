@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.arguments import number
 from ..core.check import as_mesh
-from ..errors import OptionError
 
 __all__ = ["Elements", "Quality", "elements", "quality", "side_by_side"]
 
@@ -148,8 +148,8 @@ def quality(V: ArrayLike, F: ArrayLike, L: float | None = None) -> Quality:
     -----
     The mixed Voronoi areas [Meyer et al. 2003, section 3.3] are libigl's.
     """
-    if L is not None and not (np.isfinite(L) and L > 0):
-        raise OptionError(f"L must be a positive length, got {L!r}")
+    if L is not None:
+        L = number(L, "L", above=0.0, unit="units of V")
     V, F = as_mesh(V, F)
     repeated = _is_repeated(F)
     used, F = _referenced(F[~repeated], len(V))

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arguments import choice
 from ..core.lazy import Lazy, LazyRecipe
-from ..errors import OptionError
 from .report import Report
-from .transfer import as_matrix, as_values, interpolate, pick, to_numpy
+from .transfer import TRANSFER_METHODS, as_matrix, as_values, interpolate, pick, to_numpy
 
 __all__ = ["RemeshResult"]
 
@@ -178,14 +178,17 @@ class RemeshResult:
         OptionError
             The shape does not fit, or there is no such ``on`` or ``method``.
         """
+        on = choice(on, "on", _PLACES)
+        method = choice(method, "method", TRANSFER_METHODS)
         m = len(self._input_faces)
-        if _place(on) == "faces":
+        if on == "faces":
             values = as_values(values, (m,), on)
             return pick(values, self.face_birth)
         if on == "vertices":
             values = as_values(values, (self._n_in,), on)
             return interpolate(values, *self._vertex_weights(), method)
-        is_flat = np.ndim(values) >= 1 and len(values) == 3 * m and np.shape(values)[:2] != (m, 3)
+        values = as_values(values, (), on)
+        is_flat = values.shape[:1] == (3 * m,) and values.shape[:2] != (m, 3)
         values = as_values(values, (3 * m,) if is_flat else (m, 3), on)
         flat = values.reshape(3 * m, *values.shape[1 if is_flat else 2 :])
         out = interpolate(flat, *self._corner_weights(), method)
@@ -205,7 +208,7 @@ class RemeshResult:
             (n, n_in), (m, m_in) or (3 m, 3 m_in) float64; the rows sum to 1.
         """
         m = len(self._input_faces)
-        if _place(on) == "faces":
+        if choice(on, "on", _PLACES) == "faces":
             births = self.face_birth
             return as_matrix(births[:, None], np.ones((len(births), 1)), m)
         if on == "vertices":
@@ -228,10 +231,10 @@ class RemeshResult:
         (n_in, ...)
             NaN, or 0 for types without it, at vertices that no face uses.
         """
+        on = choice(on, "on", ("vertices", "faces"))
+        method = choice(method, "method", TRANSFER_METHODS)
         if on == "faces":
             return pick(as_values(values, (len(self.F),), on), self.image_face)
-        if on != "vertices":
-            raise OptionError(f'on must be "vertices" or "faces" here; got {on!r}')
         values = as_values(values, (len(self.V),), on)
         return interpolate(values, *self._image_weights(), method)
 
@@ -258,9 +261,3 @@ class RemeshResult:
         index = to_numpy(self.F)[self.image_face].astype(np.int64)
         index[self.image_face < 0] = -1
         return index, self.image_barycentric
-
-
-def _place(on: Any) -> str:
-    if not isinstance(on, str) or on not in _PLACES:
-        raise OptionError(f"on must be one of {', '.join(_PLACES)}; got {on!r}")
-    return on

@@ -38,7 +38,10 @@ def to_numpy(value: Any) -> NDArray[Any]:
 
 def as_values(values: Any, shape: tuple[int, ...], noun: str) -> Any:
     """Check that there is one value, of any shape, for every element; tensors stay tensors."""
-    array = values if is_tensor(values) else np.asarray(values)
+    try:
+        array = values if is_tensor(values) else np.asarray(values)
+    except (ValueError, TypeError) as error:
+        raise OptionError(f"values on {noun} are not a rectangular array: {error}") from error
     if tuple(array.shape[: len(shape)]) != shape:
         wanted = ", ".join(str(n) for n in shape)
         raise OptionError(
@@ -66,8 +69,6 @@ def interpolate(values: Any, index: IntArray, weights: FloatArray, method: str) 
     (j, ...)
         In the type of the values.
     """
-    if not isinstance(method, str) or method not in TRANSFER_METHODS:
-        raise OptionError(f"method must be one of {', '.join(TRANSFER_METHODS)}; got {method!r}")
     if is_tensor(values):
         return _interpolate_tensor(values, index, weights, method)
     is_float = values.dtype.kind in "fc"

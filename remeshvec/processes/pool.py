@@ -299,7 +299,7 @@ class _Worker:
             There was none: the process has died, or was ended because it took too long.
         """
         late = threading.Event()
-        timer = threading.Timer(timeout or 0.0, self._give_up, [late])
+        timer = threading.Timer(min(timeout or 0.0, threading.TIMEOUT_MAX), self._give_up, [late])
         if timeout is not None:
             timer.daemon = True
             timer.start()

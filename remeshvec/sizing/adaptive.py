@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, log1p, nan, sqrt
+from math import inf, log1p, sqrt
 from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arguments import number
 from ..core.compiler import inlined, kernel
 from ..core.geometry import area_vector
 from ..core.vocabulary import FloatArray, IndexArray
@@ -51,7 +52,7 @@ class Adaptive:
     Raises
     ------
     OptionError
-        A value that is no positive number, or ``min_length`` above ``max_length``.
+        A value is not a positive number, or ``min_length`` is above ``max_length``.
 
     Examples
     --------
@@ -63,10 +64,10 @@ class Adaptive:
     max_length: float | None = None
 
     def __post_init__(self) -> None:
-        _positive_lengths("tolerance", self.tolerance)
+        number(self.tolerance, "tolerance", above=0.0, unit="units of V")
         for name in ("min_length", "max_length"):
             if getattr(self, name) is not None:
-                _positive_lengths(name, getattr(self, name))
+                number(getattr(self, name), name, above=0.0, unit="units of V")
         if self.min_length and self.max_length and self.min_length > self.max_length:
             raise OptionError(
                 f"min_length = {self.min_length} is above max_length = {self.max_length}; "
@@ -141,7 +142,7 @@ def target_lengths(V: FloatArray, L: Any) -> float | FloatArray:
         What ``L`` gives is not positive and finite, or not one number a vertex.
     """
     if isinstance(L, Real):
-        return _positive_lengths("L", L, "a positive length in the units of V")
+        return number(L, "L", above=0.0, unit="units of V")
     name = "L"
     if callable(L):
         L, name = L(np.array(V, np.float64)), "L(points)"  # a copy: it may write to its argument
@@ -176,20 +177,6 @@ def _kind(value: Any, array: NDArray[Any]) -> str:
     """Say what was given instead of an array of numbers."""
     is_array = isinstance(value, np.ndarray | list | tuple) and array.dtype.kind != "O"
     return f"dtype {array.dtype}" if is_array else f"{type(value).__name__}"
-
-
-def _positive_lengths(
-    name: str, value: Any, what: str = "a positive number in the units of V"
-) -> float:
-    number = nan
-    if isinstance(value, Real) and not isinstance(value, bool | np.bool_):
-        try:
-            number = float(value)
-        except OverflowError:
-            number = inf
-    if not 0.0 < number < inf:
-        raise OptionError(f"{name} must be {what}; got {value!r}")
-    return number
 
 
 # -- how many faces they make -----------------------------------------------------------------

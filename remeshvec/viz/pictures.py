@@ -15,7 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import RemeshvecError
+from ..core import arguments
+from ..core.check import as_array, as_mesh
+from ..errors import OptionError, RemeshvecError
 from ..files.plain import check_writable, write_file
 
 __all__ = [
@@ -68,6 +70,15 @@ class CameraFrame(NamedTuple):
     pixels: tuple[int, int]
 
 
+class PictureScene(NamedTuple):
+    """What a picture shows: two meshes with their titles, and from where."""
+
+    meshes: tuple[tuple[FloatArray, IntArray], tuple[FloatArray, IntArray]]
+    titles: tuple[str, str]
+    camera: Camera
+    frame: CameraFrame
+
+
 def picture(
     path: str | os.PathLike[str],
     before: Arrays,
@@ -99,13 +110,15 @@ def picture(
     MeshFormatError
         The file cannot be written.
     """
+    path = arguments.path(path, "path")
+    scene = _scene(before, after, titles, width, up)
     pyvista = require_viewer()
     check_writable(path, PICTURE_SUFFIXES)
     from PIL import Image
 
     # VTK warns on stderr that there is no X server, then renders without one.
     with pyvista.vtk_verbosity("off"):
-        plotter = _plotter(pyvista, before, after, titles, width, up, off_screen=True)
+        plotter = _plotter(pyvista, scene, off_screen=True)
         try:
             image = plotter.screenshot(return_img=True)
         finally:
@@ -133,8 +146,9 @@ def show(
     ViewerMissingError
         PyVista is not installed, or there is no display.
     """
+    scene = _scene(before, after, titles, width, up)
     pyvista = require_viewer(window=True)
-    _plotter(pyvista, before, after, titles, width, up, off_screen=False).show()
+    _plotter(pyvista, scene, off_screen=False).show()
 
 
 def require_viewer(*, window: bool = False) -> Any:
@@ -150,6 +164,7 @@ def require_viewer(*, window: bool = False) -> Any:
     ViewerMissingError
         PyVista is not installed, or there is no display.
     """
+    window = arguments.flag(window, "window")
     try:
         pyvista = importlib.import_module("pyvista")
     except ImportError as error:
@@ -162,20 +177,24 @@ def require_viewer(*, window: bool = False) -> Any:
     return pyvista
 
 
-def _plotter(
-    pyvista: Any,
-    before: Arrays,
-    after: Arrays,
-    titles: tuple[str, str],
-    width: int,
-    up: str,
-    *,
-    off_screen: bool,
-) -> Any:
-    """Set the scene: two meshes, one camera for both."""
-    meshes = [_as_arrays(mesh) for mesh in (before, after)]
-    camera = three_quarter_view(*meshes[0], UP[up])
+def _scene(
+    before: Arrays, after: Arrays, titles: tuple[str, str], width: int, up: str
+) -> PictureScene:
+    """Check what the caller wants in a picture, and place the camera."""
+    meshes = (_as_arrays(before, "before"), _as_arrays(after, "after"))
+    axes = UP[arguments.choice(up, "up", UP)]
+    width = arguments.count(width, "width")
+    if not isinstance(titles, tuple | list) or len(titles) != 2:
+        raise OptionError(f"titles must be two strings; got {titles!r}")
+    names = (arguments.text(titles[0], "titles[0]"), arguments.text(titles[1], "titles[1]"))
+    camera = three_quarter_view(*meshes[0], axes)
     frame = _frame(np.concatenate([V[F].reshape(-1, 3) for V, F in meshes]), camera, width)
+    return PictureScene(meshes, names, camera, frame)
+
+
+def _plotter(pyvista: Any, scene: PictureScene, *, off_screen: bool) -> Any:
+    """Set the scene: two meshes, one camera for both."""
+    meshes, titles, camera, frame = scene
     plotter = pyvista.Plotter(
         shape=(1, 2), border=False, window_size=list(frame.pixels), off_screen=off_screen
     )
@@ -229,11 +248,29 @@ def _aim(plotter: Any, camera: Camera) -> None:
     plotter.reset_camera_clipping_range()
 
 
-def three_quarter_view(V: FloatArray, F: IntArray, axes: FloatArray) -> Camera:
-    """Choose a three-quarter view on the side that shows most area.
+def three_quarter_view(V: ArrayLike, F: ArrayLike, axes: ArrayLike) -> Camera:
+    """Choose a three-quarter view of the side that shows most area.
 
-    The rows of `axes` are the directions to the right, up, and to the front of the object.
+    Parameters
+    ----------
+    V, F : (n, 3) float, (m, 3) int
+        Vertices and faces.
+    axes : (3, 3) float
+        The rows are unit vectors: to the right of the object, up, and to its front.
+
+    Returns
+    -------
+    Camera
+
+    Raises
+    ------
+    MeshInputError
+        The arrays cannot be a triangle mesh.
+    OptionError
+        ``axes`` is not a (3, 3) array of finite numbers.
     """
+    V, F = as_mesh(V, F)
+    axes = _as_axes(axes)
     normals = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]) @ axes.T
     angles = np.radians(sorted(range(-85, 90, 5), key=abs))  # a half circle, its front first
     sides = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)])
@@ -246,6 +283,16 @@ def three_quarter_view(V: FloatArray, F: IntArray, axes: FloatArray) -> Camera:
     right = np.array([np.cos(turned), 0.0, -np.sin(turned)])
     eye = np.cos(elevation) * level + np.sin(elevation) * np.array([0.0, 1.0, 0.0])
     return Camera(eye @ axes, right @ axes, np.cross(eye, right) @ axes)
+
+
+def _as_axes(axes: ArrayLike) -> FloatArray:
+    array = as_array(axes, "axes")
+    if array.shape != (3, 3) or array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+        raise OptionError(
+            "axes must be three rows of three finite numbers; "
+            f"got shape {array.shape} of {array.dtype}"
+        )
+    return array.astype(np.float64)
 
 
 def _frame(points: FloatArray, camera: Camera, width: int) -> CameraFrame:
@@ -269,5 +316,12 @@ def _mean_edge(V: FloatArray, F: IntArray) -> float:
     return float(np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2).mean())
 
 
-def _as_arrays(mesh: Arrays) -> tuple[FloatArray, IntArray]:
-    return np.asarray(mesh[0], dtype=np.float64), np.asarray(mesh[1], dtype=np.int64)
+def _as_arrays(mesh: Arrays, name: str) -> tuple[FloatArray, IntArray]:
+    """Check vertices and faces; errors name the argument that holds them."""
+    try:
+        V, F = mesh[0], mesh[1]
+    except (TypeError, LookupError):
+        raise OptionError(
+            f"{name} must be a pair of vertices and faces; got an object of type {type(mesh).__name__}"
+        ) from None
+    return as_mesh(V, F, (f"{name}[0]", f"{name}[1]"))
