@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import pyvista
 
+from .input.options import RemeshKeywords
 from .measures.quality import Quality, quality
-from .pipeline.remesh import RemeshOptions, remesh
+from .pipeline.remesh import remesh
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -22,7 +23,7 @@ class RemeshvecAccessor:
     def __init__(self, mesh: Any) -> None:
         self._mesh = mesh
 
-    def remesh(self, L: Any = None, **options: Unpack[RemeshOptions]) -> Any:
+    def remesh(self, L: Any = None, **options: Unpack[RemeshKeywords]) -> Any:
         """Return a remeshed surface with the same point, cell and field data.
 
         Parameters

@@ -12,9 +12,10 @@ from ..core import arguments
 from ..core.threads import available_threads
 from ..errors import BatchError, OptionError
 from ..files.plain import MeshFile, read_mesh
+from ..input.options import RemeshKeywords
 from ..output.result import RemeshResult
 from ..pipeline.job import Lengths
-from ..pipeline.remesh import RemeshOptions, remesh
+from ..pipeline.remesh import remesh
 from ..processes.pool import Outcome, run_here, run_in_processes
 from .progress import bar
 
@@ -58,7 +59,7 @@ def remesh_many(
     ordered: bool = True,
     progress: bool = False,
     timeout: float | None = None,
-    **options: Unpack[RemeshOptions],
+    **options: Unpack[RemeshKeywords],
 ) -> Iterator[BatchItem]:
     """Remesh many meshes, in several processes.
 

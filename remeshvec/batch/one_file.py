@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 from ..core import arguments
 from ..files.plain import PATHS
 from ..files.with_data import check_data_writable, read_data, write_data
+from ..input.options import RemeshKeywords
 from ..interop.mesh_data import MeshData, carry
 from ..output.result import RemeshResult
-from ..pipeline.remesh import RemeshOptions, remesh
+from ..pipeline.remesh import remesh
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -18,7 +19,7 @@ __all__ = ["remesh_file", "with_feature_data"]
 
 
 def remesh_file(
-    source: PATHS, target: PATHS, L: Any = None, **options: Unpack[RemeshOptions]
+    source: PATHS, target: PATHS, L: Any = None, **options: Unpack[RemeshKeywords]
 ) -> RemeshResult:
     """Remesh a file with its colours, texture coordinates, fields and groups, where formats hold them.
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arguments import choice, number
 from ..core.check import as_array, as_indices, as_mask
 from ..core.vocabulary import NONE, IndexArray, Mesh
 from ..errors import OptionError
 from ..mesh.edges import edge_keys
 from ..mesh.walk import ends_of
+from .options import RemeshOptions
 
 __all__ = ["BOUNDARY_MODES", "ConstraintMasks", "Constraints", "make_constraints"]
 
@@ -158,20 +159,8 @@ def _borders(twin: NDArray[np.int32], value: NDArray[Any]) -> BoolArray:
     return border
 
 
-def make_constraints(
-    n: int,
-    F: NDArray[np.int64],
-    *,
-    feature_angle: Any = "auto",
-    boundary: Any = "free",
-    feature_edges: Any = None,
-    fixed_vertices: Any = None,
-    fixed_faces: Any = None,
-    face_labels: Any = None,
-    preserve: Any = None,
-    selection: Any = None,
-) -> Constraints:
-    """Check the caller's wishes against a mesh of ``n`` vertices and faces ``F``.
+def make_constraints(n: int, F: NDArray[np.int64], options: RemeshOptions) -> Constraints:
+    """Check what the caller wants kept against a mesh of ``n`` vertices and faces ``F``.
 
     Raises
     ------
@@ -179,32 +168,48 @@ def make_constraints(
         An index out of range, an array of the wrong shape, an edge that the mesh does not have, an
         angle or a mode that does not exist.
     """
-    fixed = None if fixed_faces is None else as_mask(fixed_faces, len(F), "fixed_faces", "face")
-    unselected = None
-    if selection is not None:
-        unselected = ~as_mask(selection, len(F), "selection", "face")
-        fixed = unselected if fixed is None else fixed | unselected
-    labels = None
-    if face_labels is not None:
-        labels = as_array(face_labels, "face_labels")
-        if labels.shape != (len(F),) or labels.dtype.kind not in "iub":
-            raise OptionError(
-                f"face_labels must hold one whole number a face, shape ({len(F)},); "
-                f"got shape {labels.shape} of {labels.dtype}"
-            )
+    fixed, unselected = _kept_faces(options, len(F))
     return Constraints(
-        _feature_angle(feature_angle),
-        _mode(boundary),
-        _feature_edges(feature_edges, n, F),
-        np.empty(0, np.int64)
-        if fixed_vertices is None
-        else as_indices(fixed_vertices, n, "fixed_vertices", "vertex"),
+        _feature_angle(options.feature_angle),
+        choice(options.boundary, "boundary", BOUNDARY_MODES),
+        _feature_edges(options.feature_edges, n, F),
+        _fixed_vertices(options.fixed_vertices, n),
         fixed,
-        labels,
-        _corner_data(preserve, len(F)),
+        _labels(options.face_labels, len(F)),
+        _corner_data(options.preserve, len(F)),
         unselected,
         F,
     )
+
+
+def _fixed_vertices(given: Any, n: int) -> NDArray[np.int64]:
+    if given is None:
+        return np.empty(0, np.int64)
+    return as_indices(given, n, "fixed_vertices", "vertex")
+
+
+def _kept_faces(options: RemeshOptions, m: int) -> tuple[BoolArray | None, BoolArray | None]:
+    """Masks of the faces that stay, and of those that do because they are not selected."""
+    fixed = unselected = None
+    if options.fixed_faces is not None:
+        fixed = as_mask(options.fixed_faces, m, "fixed_faces", "face")
+    if options.selection is not None:
+        unselected = ~as_mask(options.selection, m, "selection", "face")
+        fixed = unselected if fixed is None else fixed | unselected
+    return fixed, unselected
+
+
+def _labels(given: Any, m: int) -> NDArray[Any] | None:
+    """Check one whole number per face."""
+    if given is None:
+        return None
+    labels = as_array(given, "face_labels")
+    if labels.shape != (m,) or labels.dtype.kind not in "iub":
+        raise OptionError(
+            f"face_labels must hold one whole number per face, shape ({m},); "
+            f"got shape {labels.shape} of {labels.dtype}"
+        )
+    return labels
 
 
 def _corner_data(preserve: Any, m: int) -> list[NDArray[Any]]:
@@ -247,18 +252,12 @@ def _differ(
 def _feature_angle(value: Any) -> float | str | None:
     if value is None or (isinstance(value, str) and value == "auto"):
         return value
-    is_number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
-    if not is_number or not 0.0 < float(value) < 180.0:
+    try:
+        return number(value, "feature_angle", above=0.0, below=180.0)
+    except OptionError:
         raise OptionError(
             f'feature_angle must be "auto", None or degrees between 0 and 180; got {value!r}'
-        )
-    return float(value)
-
-
-def _mode(value: Any) -> str:
-    if not isinstance(value, str) or value not in BOUNDARY_MODES:
-        raise OptionError(f"boundary must be one of {', '.join(BOUNDARY_MODES)}; got {value!r}")
-    return value
+        ) from None
 
 
 def _feature_edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ..input.options import Options
+from ..input.recipe import Recipe
 from ..measures.quality import Quality, quality
 
 __all__ = [
@@ -24,8 +24,8 @@ class Report:
     ----------
     target_length : float
         L, in the units of the input.
-    options : Options
-        The options in force.
+    options : Recipe
+        The options in force: the preset with what was changed in it.
     sweeps : list of dict
         Counts of edges split, collapsed and flipped, one dict a sweep.
     seconds : dict
@@ -45,7 +45,7 @@ class Report:
     """
 
     target_length: float
-    options: Options
+    options: Recipe
     sweeps: list[dict[str, int]]
     seconds: dict[str, float]
     stop: str

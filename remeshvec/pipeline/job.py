@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
@@ -13,10 +13,17 @@ from ..core.vocabulary import DEAD, FloatArray, Mesh
 from ..errors import OptionError
 from ..input.constraints import Constraints
 from ..input.prepare import Prepared
+from ..input.recipe import Recipe
 from ..reference.build import FeaturedReference, build_reference
 from ..sizing.adaptive import Adaptive
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
-from ..sweeps.sweeps import Sweeps
+from ..sweeps.deviation import DeviationGuard
+from ..sweeps.finish import finish, has_finish, measure_deviation
+from ..sweeps.guard import Guard
+from ..sweeps.loop import Stop, run_sweeps
+from ..sweeps.plan import Adaptation, Plan, make_schedule
+from ..sweeps.progress import Progress
+from ..sweeps.work import Work, is_large
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
 
@@ -38,12 +45,15 @@ class Sizing:
 
 @dataclass(frozen=True)
 class Remeshed:
-    """A remeshed surface in the frame of `Prepared`."""
+    """A remeshed surface in the frame of `Prepared`, and what happened on the way."""
 
     mesh: Mesh
     is_compact: bool
     featured: FeaturedReference
     length: float  # of the mean new edge, in the units of the input
+    counts: list[dict[str, int]]  # of every sweep
+    stop: str  # why the sweeps ended, in words
+    deviation: dict[str, float]  # from the input, in its units
 
     def count(self, noun: str) -> int:
         """Count faces or vertices."""
@@ -64,22 +74,21 @@ class Job:
         constraints: Constraints,
         V: FloatArray,
         sizing: Sizing,
-        sweeps: Sweeps,
+        recipe: Recipe,
+        progress: Progress,
+        may_run_parallel: bool,
     ) -> None:
         self.prepared = prepared
         self.constraints = constraints
         self.V = V
         self.sizing = sizing
-        self.sweeps = sweeps
-        self.parallel = sweeps.is_parallel(len(prepared.mesh.origin) // 3)
-        with sweeps.watch.time("reference"):
+        self.recipe = recipe
+        self.progress = progress
+        self.may_run_parallel = may_run_parallel
+        self.parallel = may_run_parallel and is_large(len(prepared.mesh.origin) // 3)
+        with progress.watch.time("reference"):
             self.size = mesh_size(prepared, self.parallel)
-        sweeps.scale = prepared.scale
-        sweeps.gradation = sizing.gradation
-        if isinstance(sizing.L, Adaptive):
-            sweeps.tolerance = sizing.L.tolerance * prepared.scale
-            sweeps.shortest = adaptive_limits(prepared, sizing.L)[0]
-            sweeps.limit_lengths = lambda x: limited_lengths(prepared, x, sizing.gradation)
+        self.plan = Plan(recipe, prepared.scale, sizing.gradation, _adaptation(prepared, sizing))
 
     def run_once(self) -> Remeshed:
         """Remesh, and let go of the prepared mesh; lengths from the curvature need it again."""
@@ -96,12 +105,27 @@ class Job:
 
     def _sweep(self, meshes: list[Mesh], L: Lengths | None) -> Remeshed:
         """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
-        with self.sweeps.watch.time("reference"):
+        progress = self.progress
+        with progress.watch.time("reference"):
             featured, length = self._build_reference(meshes[0], L)
-        mesh = self.sweeps.run(meshes.pop(), featured)
-        is_compact = self.sweeps.has_more(featured)
-        mesh = self.sweeps.finish(mesh, featured) if is_compact else mesh
-        return Remeshed(mesh, is_compact, featured, length / self.prepared.scale)
+        progress.counts = []
+        work = Work(meshes.pop(), featured, self.plan, progress, self.may_run_parallel)
+        guard = Guard()
+        if self.plan.max_deviation is not None:
+            guard = DeviationGuard(featured, self.plan.max_deviation, work.is_parallel)
+        stop = run_sweeps(work, make_schedule(self.recipe), guard)
+        is_compact = has_finish(work)
+        if is_compact:
+            finish(work, guard)
+        return Remeshed(
+            work.mesh,
+            is_compact,
+            featured,
+            length / self.prepared.scale,
+            progress.counts,
+            _in_words(stop, self.recipe.tol),
+            measure_deviation(work, guard),
+        )
 
     def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
         """Set the lengths of a mesh, mark its features, build the reference."""
@@ -117,10 +141,30 @@ class Job:
             angle,
             self.sizing.gradation,
             self.sizing.max_faces,
-            self.sweeps.options.max_deviation,
+            self.recipe.max_deviation,
         )
         mean_edge = self.size.mean_edge
         return build_reference(mesh, source, angle, marks, mean_edge, self.parallel), length
+
+
+def _adaptation(prepared: Prepared, sizing: Sizing) -> Adaptation | None:
+    """Say how lengths are corrected, where they follow from the curvature."""
+    if not isinstance(sizing.L, Adaptive):
+        return None
+    return Adaptation(
+        sizing.L.tolerance * prepared.scale,
+        adaptive_limits(prepared, sizing.L)[0],
+        lambda lengths: limited_lengths(prepared, lengths, sizing.gradation),
+    )
+
+
+def _in_words(stop: Stop, tol: float | None) -> str:
+    if stop is not Stop.CONVERGED:
+        return str(stop.value)
+    return (
+        f"converged (tol): the last sweep changed less than {tol:g} of the edges and moved "
+        f"vertices by less than {tol:g} L"
+    )
 
 
 def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
@@ -138,11 +182,12 @@ def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
         if best is None or abs(count - wanted) < abs(best.count(noun) - wanted):
             best = done
         held = done.count_held() // (1 if noun == "faces" else 2)
-        if abs(count - wanted) <= _CLOSE_ENOUGH * wanted or job.sweeps.stop == "cancelled":
+        if abs(count - wanted) <= _CLOSE_ENOUGH * wanted or job.progress.is_cancelled:
             break
         L *= min(2.0, max(0.5, sqrt(max(count - held, 1) / max(wanted - held, 1))))
     assert best is not None
     count = best.count(noun)
-    if abs(count - wanted) > _CLOSE_ENOUGH * wanted:
-        job.sweeps.stop += f"; {count:,} {noun} are as near to {wanted:,} as {_TRIES} tries came"
-    return best
+    if abs(count - wanted) <= _CLOSE_ENOUGH * wanted:
+        return best
+    missed = f"{count:,} {noun} are as near to {wanted:,} as {_TRIES} tries came"
+    return replace(best, stop=f"{best.stop}; {missed}")

@@ -1,8 +1,7 @@
 """The guard of `max_deviation`: samples of both surfaces, and what to hold where they lie too far apart.
 
-A sweep is tried on a copy. Samples of the new mesh must lie near the input, samples of the input near
-the new mesh; where one does not, the vertices and edges of the mesh before the sweep are held around it,
-and the sweep is run again. So no operation needs to know, whatever moved the surface.
+Samples of the new mesh must lie near the input, samples of the input near the new mesh. Around those that
+do not, vertices and edges of the mesh before the sweep are held, and the sweep is run again.
 """
 
 from __future__ import annotations
@@ -28,6 +27,7 @@ from ..core.vocabulary import (
 from ..features.polyline import find_siblings
 from ..reference.build import FeaturedReference
 from ..reference.bvh import build_tree, closest_faces
+from .guard import HoldingGuard
 
 __all__ = ["DeviationGuard", "edges_to_refine", "sample_mesh", "shortened_lengths"]
 
@@ -55,8 +55,8 @@ def sample_mesh(X: FloatArray, F: IndexArray) -> tuple[FloatArray, IndexArray]:
     return points, np.repeat(np.arange(len(F), dtype=np.int32), len(_GRID))
 
 
-class DeviationGuard:
-    """Compares meshes with the input, and holds what must not go on.
+class DeviationGuard(HoldingGuard):
+    """Compares meshes with the input, and holds what would lead too far from it.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class DeviationGuard:
         self.held = np.zeros(0, np.bool_)
 
     def remember(self, mesh: Mesh) -> None:
-        """Take note of a mesh, compact, before it is changed."""
+        """Build the tree of a compact mesh before it is changed."""
         self.before = _tree_of(mesh, self.parallel)
         self.held = np.zeros(len(mesh.X), np.bool_)
 
@@ -108,15 +108,15 @@ class DeviationGuard:
         points, to_input, from_input = self.distances(mesh, limit)
         return np.concatenate([points[to_input > limit], self.samples[from_input > limit]])
 
-    def hold(self, mesh: Mesh, points: FloatArray, rings: int) -> None:
-        """Hold the mesh that was remembered around points, and so many rings of faces more."""
+    def hold(self, mesh: Mesh, offenders: FloatArray, attempt: int) -> None:
+        """Hold the mesh that was remembered around points, and as many rings of faces more."""
         assert self.before is not None
-        anywhere = np.full(len(points), NONE, np.int32)
-        faces, _ = closest_faces(self.before, points, anywhere, 0.0, self.parallel)
+        anywhere = np.full(len(offenders), NONE, np.int32)
+        faces, _ = closest_faces(self.before, offenders, anywhere, 0.0, self.parallel)
         F = mesh.origin.reshape(-1, 3)
         is_held = np.zeros(len(mesh.X), np.bool_)
         is_held[F[faces]] = True
-        for _ in range(rings):
+        for _ in range(attempt):
             is_held[F[is_held[F].any(axis=1)]] = True
         _agree_across_sheets(mesh, is_held)
         inner, on_curve = is_held & (mesh.kind == INNER), is_held & (mesh.kind == CURVE)

@@ -1,0 +1,121 @@
+"""One call on arrays, start to end: check, prepare, sweep, extract."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core.arguments import count, function
+from ..core.check import as_mesh
+from ..core.compiler import compile_notice
+from ..core.lazy import Lazy, LazyRecipe
+from ..core.stopwatch import Stopwatch
+from ..core.threads import thread_scope
+from ..errors import OptionError
+from ..input.constraints import Constraints, make_constraints
+from ..input.options import RemeshOptions
+from ..input.prepare import prepare
+from ..input.recipe import Recipe, make_recipe
+from ..output.births import corner_births, face_births, images, vertex_births
+from ..output.extract import Output, extract, locate
+from ..output.report import Report
+from ..output.result import RemeshResult
+from ..sizing.target_lengths import check_gradation
+from ..sweeps.progress import Progress
+from ..sweeps.work import is_large
+from .job import Job, Remeshed, Sizing, meet_count
+
+__all__ = ["remesh_arrays"]
+
+
+def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResult:
+    """Remesh arrays."""
+    watch = Stopwatch()
+    recipe = make_recipe(options)
+    wanted = _wanted_count(L, options)
+    sizing = Sizing(L, check_gradation(options.gradation), count(options.max_faces, "max_faces"))
+    if options.callback is not None:
+        function(options.callback, "callback")
+    with watch.time("check"):
+        vertices, faces = as_mesh(V, F)
+        constraints = make_constraints(len(vertices), faces, options)
+    with compile_notice(), thread_scope(recipe.threads) as may_run_parallel:
+        with watch.time("build"):
+            prepared = prepare(vertices, faces, may_run_parallel and is_large(len(faces)))
+        progress = Progress(watch, options.callback)
+        job = Job(prepared, constraints, vertices, sizing, recipe, progress, may_run_parallel)
+        del prepared  # it holds the mesh of the input
+        done = job.run_once() if wanted is None else meet_count(job, *wanted)
+        out = _extract(job, done, constraints, len(faces), np.asarray(F).dtype)
+        with watch.time("extract"):
+            V2 = out.V.astype(_vertex_dtype(V), copy=False)
+    report = Report(
+        done.length, recipe, done.counts, watch.stop(), done.stop, job.prepared.dirt,
+        done.featured.counts, done.deviation, before=(V, F), after=(V2, out.F),
+    )  # fmt: skip
+    return _result(V2, out, report)
+
+
+def _extract(
+    job: Job, done: Remeshed, constraints: Constraints, n_faces: int, dtype: np.dtype[Any]
+) -> Output:
+    """Turn the last mesh into the arrays of a result."""
+    recipe, watch = job.recipe, job.progress.watch
+    parallel = job.may_run_parallel and is_large(len(done.mesh.origin) // 3)
+    barycentric = None
+    if _ends_on_input(recipe):
+        with watch.time("locate"):
+            barycentric = locate(
+                done.mesh, done.featured.reference, not recipe.fit_rounds, parallel
+            )
+    with watch.time("extract"):
+        return extract(
+            done.mesh,
+            done.is_compact,
+            barycentric,
+            job.prepared,
+            done.featured,
+            constraints,
+            job.V,
+            (n_faces, dtype),
+            recipe.threads if parallel else 1,
+        )
+
+
+def _ends_on_input(recipe: Recipe) -> bool:
+    """Tell whether births are found at the end of the call, next to where vertices were projected."""
+    return recipe.project or recipe.fit_rounds > 0
+
+
+def _result(V: Any, out: Output, report: Report) -> RemeshResult:
+    """Put the result together; what few callers ask for is left as a recipe."""
+    provenance = out.provenance
+    return RemeshResult(
+        V, out.F, report, out.face_labels, out.lengths,
+        LazyRecipe(partial(vertex_births, provenance)),
+        LazyRecipe(partial(face_births, provenance)),
+        LazyRecipe(partial(corner_births, provenance)),
+        LazyRecipe(partial(images, provenance)),
+        Lazy(out.vertex_map), Lazy(out.face_map), Lazy(out.feature_edges), Lazy(out.corners),
+    )  # fmt: skip
+
+
+def _wanted_count(L: Any, options: RemeshOptions) -> tuple[str, int] | None:
+    """Return what to count and how many are wanted, None for a length."""
+    counts = {"n_faces": options.n_faces, "n_vertices": options.n_vertices}
+    given = {name: value for name, value in {"L": L, **counts}.items() if value is not None}
+    if len(given) > 1:
+        raise OptionError(f"{' and '.join(given)} exclude each other; give one of them")
+    for name, value in counts.items():
+        if value is not None:
+            return name.removeprefix("n_"), count(value, name)
+    return None
+
+
+def _vertex_dtype(V: ArrayLike) -> np.dtype[Any]:
+    """Return the caller's dtype; coordinates that were whole numbers come back as float64."""
+    dtype = np.asarray(V).dtype
+    return dtype if dtype.kind == "f" else np.dtype(np.float64)
