@@ -33,7 +33,7 @@ PHASES = {
 ROUNDS = 20
 
 # The module that calls the phases.
-MODULE = import_module("remeshvec.sweeps.sweeps")
+MODULE = import_module("remeshvec.sweeps.phases")
 
 
 @pytest.mark.parametrize("mesh", DATA)

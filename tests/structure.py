@@ -24,6 +24,7 @@ from remeshvec.core.vocabulary import (
 )
 from remeshvec.features.curves import link_chains
 from remeshvec.input.constraints import make_constraints
+from remeshvec.input.options import RemeshOptions
 from remeshvec.mesh.blocks import make_blocks
 from remeshvec.mesh.halfedge import build_mesh
 from remeshvec.mesh.morton import order_mesh
@@ -97,7 +98,9 @@ def featured(
     if vertex_source is None:
         vertex_source = np.arange(len(mesh.X), dtype=np.int32)
     F = vertex_source[mesh.origin.reshape(-1, 3)].astype(np.int64)
-    constraints = make_constraints(int(F.max()) + 1, F, **{"feature_angle": None, **wanted})
+    constraints = make_constraints(
+        int(F.max()) + 1, F, RemeshOptions(**{"feature_angle": None, **wanted})
+    )
     marks = constraints.on_mesh(mesh, vertex_source, np.arange(len(F)), None)
     mean_edge = mean_edge_of(mesh)
     return build_reference(

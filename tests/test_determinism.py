@@ -228,7 +228,7 @@ import numpy as np
 from remeshvec import remesh
 from remeshvec.core import threads as _threads
 from remeshvec.mesh import blocks
-module = sys.modules["remeshvec.sweeps.sweeps"]
+module = sys.modules["remeshvec.sweeps.work"]
 path, per_block, threshold, options = json.loads(sys.argv[1])
 data = np.load(path)
 blocks.FACES_PER_BLOCK = per_block
@@ -332,7 +332,7 @@ def test_concurrent_calls_give_the_same_bits(monkeypatch):
     """They share the threads, and may run one another's pieces."""
     from concurrent.futures import ThreadPoolExecutor
 
-    monkeypatch.setattr(sys.modules["remeshvec.sweeps.sweeps"], "_PARALLEL_FACES", 0)
+    monkeypatch.setattr(sys.modules["remeshvec.sweeps.work"], "_PARALLEL_FACES", 0)
     V, F = mesh()
     expected = remeshvec.remesh(V, F, 0.15, threads=1)
     with ThreadPoolExecutor(4) as pool:

@@ -14,6 +14,7 @@ from structure import built, cut_open, featured
 
 from remeshvec import Adaptive, OptionError, remesh
 from remeshvec.input.constraints import make_constraints
+from remeshvec.input.options import RemeshOptions
 from remeshvec.input.prepare import prepare
 from remeshvec.reference.non_manifold import non_manifold_copies
 from remeshvec.sizing.target_lengths import bound_gradation, check_gradation, mesh_size, set_lengths
@@ -26,7 +27,7 @@ def prepared(V, F):
 def lengths(result, L, V=None, gradation=1.5, max_faces=10**9):
     """Set lengths; returns the length of the mean new face and those of all vertices, in V's units."""
     V = result.mesh.X[:, :3] / result.scale + result.centre if V is None else np.asarray(V, float)
-    marks = make_constraints(len(V), F_of(result)).on_mesh(
+    marks = make_constraints(len(V), F_of(result), RemeshOptions()).on_mesh(
         result.mesh, result.vertex_source, result.face_source, result.representative
     )
     mean = set_lengths(result, mesh_size(result), V, L, marks, None, gradation, max_faces)

@@ -10,13 +10,14 @@ from structure import built, curve_edges, cut_open, half_edges, next_of
 from remeshvec import OptionError
 from remeshvec.core.vocabulary import NONE
 from remeshvec.input.constraints import make_constraints
+from remeshvec.input.options import RemeshOptions
 
 V, F = zoo.grid(5, 4)
 N, M = len(V), len(F)  # 20 vertices, 24 faces
 
 
 def made(**wanted):
-    return make_constraints(N, F, **wanted)
+    return make_constraints(N, F, RemeshOptions(**wanted))
 
 
 BAD = {
@@ -151,7 +152,7 @@ def marks_of(mesh, source=None, same=None, faces=None, n=None, G=None, **wanted)
     source = np.arange(len(mesh.X), dtype=np.int32) if source is None else source
     G = source[mesh.origin.reshape(-1, 3)].astype(np.int64) if G is None else G
     faces = np.arange(len(mesh.source)) if faces is None else faces
-    found = make_constraints(int(G.max()) + 1 if n is None else n, G, **wanted)
+    found = make_constraints(int(G.max()) + 1 if n is None else n, G, RemeshOptions(**wanted))
     return found.on_mesh(mesh, source, faces, same)
 
 

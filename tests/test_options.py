@@ -2,18 +2,21 @@
 
 import dataclasses
 import inspect
+import re
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 
 from remeshvec import OptionError, remesh
+from remeshvec.cli.arguments import batch_parser, parser
 from remeshvec.core.threads import available_threads
-from remeshvec.input.options import PRESETS, make_options
-from remeshvec.pipeline.remesh import RemeshOptions
+from remeshvec.input.options import RemeshKeywords, RemeshOptions
+from remeshvec.input.recipe import PRESETS, make_recipe
 
 
 def options(preset="default", **overrides):
-    return make_options(preset, overrides)
+    return make_recipe(RemeshOptions(preset=preset, **overrides))
 
 
 def test_fast_is_the_published_algorithm():
@@ -68,14 +71,44 @@ def test_overrides():
 
 
 def test_an_angle_asked_for_is_reached_for_by_every_preset():
-    assert make_options("fast", {}).untangle_rounds == 0
-    asked = make_options("fast", {"untangle_angle": 30})
-    assert asked.untangle_rounds == make_options("default", {}).untangle_rounds > 0
+    assert options("fast").untangle_rounds == 0
+    asked = options("fast", untangle_angle=30)
+    assert asked.untangle_rounds == options("default").untangle_rounds > 0
 
 
-def test_the_typed_options_are_those_of_the_call():
-    parameters = inspect.signature(remesh).parameters.keys()
-    assert RemeshOptions.__annotations__.keys() == parameters - {"V", "F", "L", "return_result"}
+def test_keywords_flags_and_documentation_are_those_of_the_record():
+    """The record says which options there are, with types and defaults; nothing else says otherwise."""
+    record = {field.name: field for field in dataclasses.fields(RemeshOptions)}
+    assert get_type_hints(RemeshKeywords) == get_type_hints(RemeshOptions)
+    assert list(RemeshKeywords.__annotations__) == list(record)
+    parameters = inspect.signature(remesh).parameters
+    assert list(parameters) == ["V", "F", "L", "return_result", *record]
+    for name, field in record.items():
+        assert parameters[name].default == field.default
+        assert str(parameters[name].annotation) == field.type
+    documented = re.findall(r"^    (\w+(?:, \w+)*) : ", remesh.__doc__, re.MULTILINE)
+    assert ", ".join(documented).startswith(", ".join(parameters))
+
+
+# Options that name elements of one mesh come from files; functions have no flag.
+FILES = {"feature_edges", "fixed_vertices", "fixed_faces", "face_labels", "selection"}
+NO_FLAG = {"callback", "max_faces", "preserve", "untangle_angle"}
+
+
+@pytest.mark.parametrize(("flags", "absent"), [(parser, NO_FLAG), (batch_parser, NO_FLAG | FILES)])
+def test_every_option_has_a_flag(flags, absent):
+    names = {action.dest.removeprefix("no_"): action for action in flags()._actions}
+    record = {field.name: field for field in dataclasses.fields(RemeshOptions)}
+    assert record.keys() - names.keys() == absent
+    for name in record.keys() & names.keys():
+        assert names[name].default in (record[name].default, None, False)
+        if names[name].choices:
+            assert set(names[name].choices) == set(get_args(get_type_hints(RemeshOptions)[name]))
+
+
+def test_unknown_keywords_are_named():
+    with pytest.raises(TypeError, match=r"remesh\(\) got .*'iteration'; did you mean 'iterations'"):
+        remesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], iteration=3)
 
 
 def test_fit_can_be_switched_on_and_off():
@@ -86,8 +119,9 @@ def test_fit_can_be_switched_on_and_off():
 
 
 def test_options_are_frozen():
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        options().iterations = 3
+    for record in (options(), RemeshOptions()):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            record.iterations = 3
 
 
 BAD = [
@@ -103,7 +137,11 @@ BAD = [
     ({"foldover": -20}, "got -20"),
     ({"foldover": np.nan}, "got nan"),
     ({"foldover": "20 degrees"}, "got '20 degrees'"),
+    ({"foldover": "1"}, "got '1'"),
     ({"untangle_angle": 100}, "untangle_angle must be"),
+    ({"untangle_angle": True}, "got True"),
+    ({"tol": "1"}, "got '1'"),
+    ({"split": "1"}, "split must"),
     ({"sliver_check": 1}, "sliver_check must be True or False; got 1"),
     ({"project": "no"}, "project must be True or False; got 'no'"),
     ({"fit": 2}, "fit must be True or False; got 2"),
@@ -130,4 +168,4 @@ def test_bad_options_are_named(overrides, message):
 @pytest.mark.parametrize("preset", ["quick", "", "DEFAULT", None, 3, ["fast"], {}])
 def test_unknown_presets(preset):
     with pytest.raises(OptionError, match="preset must be one of fast, default, fine"):
-        make_options(preset, {})
+        options(preset)

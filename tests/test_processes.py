@@ -22,7 +22,7 @@ V, F, _ = read_mesh("data/pretzel.off")
 
 def digest(threads=None, callback=None):
     blocks.FACES_PER_BLOCK = 200
-    sys.modules["remeshvec.sweeps.sweeps"]._PARALLEL_FACES = 0
+    sys.modules["remeshvec.sweeps.work"]._PARALLEL_FACES = 0
     r = remesh(V, F, preset="fast", iterations=2, threads=threads, callback=callback)
     return hashlib.sha256(r.V.tobytes() + r.F.tobytes() + r.birth_barycentric.tobytes()).hexdigest()
 

@@ -111,11 +111,11 @@ def test_a_phase_that_takes_half_as_long_again_is_seen(tmp_path, monkeypatch, ph
     record = guard.read_record(tmp_path / "guard.json")
     assert not [s for s in guard.complaints(guard.measure(2), record) if "instructions" in s]
     name = {"collapse": "collapse_short_edges", "flip": "flip_edges", "relax": "relax_vertices"}
-    function = f"remeshvec.sweeps.sweeps.{name[phase]}"
+    function = f"remeshvec.sweeps.phases.{name[phase]}"
     monkeypatch.setattr(function, every_other_time_twice(getattr(sweeps(), name[phase])))
     said = guard.complaints(guard.measure(2), record)
     assert any(f"more instructions in {phase}" in line for line in said)
 
 
 def sweeps():
-    return sys.modules["remeshvec.sweeps.sweeps"]
+    return sys.modules["remeshvec.sweeps.phases"]

@@ -13,7 +13,8 @@ from remeshvec.core.vocabulary import DEAD
 from remeshvec.operations import split
 from remeshvec.operations.classify import classify_edges
 
-sweeps = sys.modules["remeshvec.sweeps.sweeps"]
+sweeps = sys.modules["remeshvec.sweeps.phases"]
+work = sys.modules["remeshvec.sweeps.work"]
 
 
 class Spy:
@@ -94,7 +95,7 @@ def test_holes_are_closed(name, monkeypatch):
     """Flips and moves see no more than a share of dead faces, whatever the collapses left."""
     dead = lambda mesh: float((mesh.origin[::3] == DEAD).mean())  # noqa: E731
     spy = Spy(monkeypatch, sweeps, "flip_edges", lambda mesh, *_: dead(mesh))
-    closed = Spy(monkeypatch, sweeps, "compact", lambda mesh, *_: dead(mesh))
+    closed = Spy(monkeypatch, work, "compact", lambda mesh, *_: dead(mesh))
     called(name)
     assert max(spy.calls) < sweeps._SPARSE + 0.01
     # Once where it is worth it, and at the end.
@@ -106,7 +107,7 @@ def test_holes_are_closed(name, monkeypatch):
 def test_a_guarded_sweep_keeps_its_numbers(monkeypatch):
     """The mesh that was remembered, its trials and what is held have the same vertices."""
     seen = []
-    guard = sys.modules["remeshvec.sweeps.sweeps.deviation"].DeviationGuard
+    guard = sys.modules["remeshvec.sweeps.deviation"].DeviationGuard
     for name in ("remember", "offenders", "hold"):
         method = getattr(guard, name)
 

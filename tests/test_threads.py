@@ -41,7 +41,7 @@ def pool(monkeypatch):
 def all_parallel(monkeypatch, pool):
     """Let small meshes have many blocks, and share them."""
     monkeypatch.setattr("remeshvec.mesh.blocks.FACES_PER_BLOCK", 200)
-    monkeypatch.setattr("remeshvec.sweeps.sweeps._PARALLEL_FACES", 0)
+    monkeypatch.setattr("remeshvec.sweeps.work._PARALLEL_FACES", 0)
     return pool
 
 
@@ -136,7 +136,7 @@ def spans(shared, run, args):
 
 
 def test_eight_calls_at_once_give_the_same_bits(monkeypatch, all_parallel):
-    monkeypatch.setattr("remeshvec.sweeps.sweeps._PARALLEL_FACES", 2000)
+    monkeypatch.setattr("remeshvec.sweeps.work._PARALLEL_FACES", 2000)
     meshes = [zoo.torus(48, 24), zoo.torus(24, 12), zoo.upsampled(*zoo.genus_2(), n=2, noise=0.2)]
     cases = list(itertools.product(meshes, ("fast", "default")))
     cases = (cases * 2)[:8]
