@@ -86,7 +86,7 @@ def test_every_room_has_a_floor():
 
 def test_the_graph_is_seen():
     """The test of the test: relative imports of all kinds are found."""
-    assert {"input/options.py", "input/prepare.py", "errors.py"} <= GRAPH["pipeline/remesh.py"]
+    assert {"input/recipe.py", "input/prepare.py", "errors.py"} <= GRAPH["pipeline/arrays.py"]
     assert "html_page/__init__.py" in GRAPH["output/result.py"]  # inside a function
     assert "core/threads.py" in GRAPH["core/compiler/decorators.py"]
 

@@ -79,7 +79,7 @@ BAD = {
     ),
     "labels short": (
         {"face_labels": [1, 2]},
-        r"face_labels must hold one whole number a face, shape \(24,\); got shape \(2,\)",
+        r"face_labels must hold one whole number per face, shape \(24,\); got shape \(2,\)",
     ),
     "labels float": ({"face_labels": np.zeros(M)}, r"face_labels must hold .* of float64"),
     "labels text": ({"face_labels": ["a"] * M}, r"face_labels must hold .* of <U1"),

@@ -132,7 +132,7 @@ BAD = [
     ({"iterations": "5"}, "got '5'"),
     ({"threads": 0}, "threads must be a whole number, at least 1; got 0"),
     ({"threads": 1.5}, "threads"),
-    ({"foldover": 0}, "foldover must be an angle in degrees between 0 and 90; got 0"),
+    ({"foldover": 0}, "foldover must be a number of degrees above 0 and below 90; got 0"),
     ({"foldover": 90}, "got 90"),
     ({"foldover": -20}, "got -20"),
     ({"foldover": np.nan}, "got nan"),
