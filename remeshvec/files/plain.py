@@ -306,6 +306,8 @@ def _checked_mesh(raw: _Raw) -> tuple[FloatArray, IntArray]:
         raise ValueError(f"vertices of shape (n, 3) are needed, not {V.shape}")
     if F.ndim != 2 or F.shape[1] != 3 or len(F) == 0:
         raise ValueError(f"faces of shape (m, 3) are needed, not {F.shape}")
+    if V.dtype.kind not in "fiu":
+        raise ValueError(f"vertices must be real numbers, not {V.dtype}")
     if F.dtype.kind not in "iu":
         raise ValueError(f"faces must be integers, not {F.dtype}")
     V = V.astype(np.float64, copy=False)

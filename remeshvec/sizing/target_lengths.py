@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from math import inf, isfinite, sqrt
-from numbers import Real
+from math import inf, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arguments import number
 from ..core.compiler import threaded
 from ..core.geometry import area_vector, distance_squared
 from ..core.vocabulary import DEAD, FROZEN, FloatArray, IndexArray, Mesh
@@ -118,13 +118,7 @@ def bound_gradation(
 
 def check_gradation(value: Any) -> float:
     """Check the bound for the ratio of neighbouring lengths."""
-    is_number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
-    if not is_number or not isfinite(value) or not value > 1.0:
-        raise OptionError(
-            f"gradation must be a number above 1, the largest ratio of neighbouring lengths; "
-            f"got {value!r}"
-        )
-    return float(value)
+    return number(value, "gradation", above=1.0)
 
 
 def set_lengths(
