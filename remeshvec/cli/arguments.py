@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 from ..core.version import __version__
+from ..core.vocabulary import DEFAULT_LENGTH_FACTOR
 from ..errors import OptionError
 from ..files.plain import MeshFile
 from ..files.with_data import COMMON_SUFFIXES
@@ -15,7 +16,6 @@ from ..sizing.adaptive import Adaptive
 
 __all__ = ["batch_parser", "given_options", "parser", "target_length"]
 
-DEFAULT_FACTOR = 0.9  # of the mean edge length; what the library takes when no length is given
 
 EPILOG = """\
 examples:
@@ -137,7 +137,7 @@ def target_length(options: argparse.Namespace, mesh: MeshFile) -> Any:
         return Adaptive(options.adaptive, options.min_length, options.max_length)
     if options.min_length is not None or options.max_length is not None:
         raise OptionError("--min-length and --max-length go with --adaptive")
-    if options.length is not None or options.l_factor == DEFAULT_FACTOR:
+    if options.length is not None or options.l_factor == DEFAULT_LENGTH_FACTOR:
         return options.length
     return options.l_factor * quality(mesh.V, mesh.F).edge_mean
 
@@ -163,7 +163,7 @@ def _add_size_options(
     length.add_argument(
         "--l-factor",
         type=_positive_number,
-        default=DEFAULT_FACTOR,
+        default=DEFAULT_LENGTH_FACTOR,
         metavar="X",
         help="target edge length as a multiple of the mean edge length (default %(default)s)",
     )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .threads import available_threads
+from .vocabulary import IntArray
 
 __all__ = ["even_ranges", "per_range"]
 
@@ -16,7 +16,7 @@ __all__ = ["even_ranges", "per_range"]
 _MOST_RANGES = 16
 
 
-def even_ranges(count: int, parallel: bool) -> NDArray[np.int64]:
+def even_ranges(count: int, parallel: bool) -> IntArray:
     """Cut ``range(count)`` into one range, or two for each thread."""
     if not parallel:
         return np.array([0, count])
@@ -24,6 +24,6 @@ def even_ranges(count: int, parallel: bool) -> NDArray[np.int64]:
     return np.arange(ranges + 1, dtype=np.int64) * count // ranges
 
 
-def per_range(cuts: NDArray[np.int64], *_: Any) -> int:
+def per_range(cuts: IntArray, *_: Any) -> int:
     """Pieces of a loop over ranges."""
     return len(cuts) - 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 __all__ = [
     "CURVE",
     "DEAD",
+    "DEFAULT_LENGTH_FACTOR",
+    "EQUAL_DATA",
+    "EQUILATERAL_AREA",
     "FIXED",
     "FROZEN",
     "HALTED",
@@ -20,14 +24,18 @@ __all__ = [
     "NON_MANIFOLD",
     "PINNED",
     "Blocks",
+    "BoolArray",
     "FloatArray",
     "IndexArray",
+    "IntArray",
     "Mesh",
     "Tree",
 ]
 
 IndexArray = NDArray[np.int32]
+IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 NONE = -1  # no twin: the half-edge lies on the boundary; no curve: the edge is no feature
 DEAD = -1  # origin of all three half-edges of a removed face
@@ -45,6 +53,16 @@ HELD = 1  # an inner vertex that the sweeps hold: the tip of a horn, or where mo
 CURVE = 2  # slides along its feature curve: a crease, the boundary, a border between labels
 PINNED = 3  # a vertex of a curve that the sweeps hold
 FIXED = 4  # a vertex of the input that never moves, never vanishes
+
+# Where the caller names no length, the target length is this many mean edges.
+DEFAULT_LENGTH_FACTOR = 0.9
+
+# Area of an equilateral triangle with edges of length 1.
+EQUILATERAL_AREA = sqrt(3.0) / 4.0
+
+# Data on corners that differ by less than this share of their range are equal: single precision has
+# 6e-8, and texture coordinates of one vertex are often computed once for every face.
+EQUAL_DATA = 1e-6
 
 # Bound for every walk around a vertex. A structure that passed the build always closes sooner; the
 # bound turns a broken one into a wrong answer instead of a hang.
@@ -96,8 +114,8 @@ class Mesh(NamedTuple):
 class Blocks(NamedTuple):
     """Ranges of faces and of vertices that lie together in space (both (k + 1,) int64)."""
 
-    face: NDArray[np.int64]
-    vertex: NDArray[np.int64]
+    face: IntArray
+    vertex: IntArray
 
 
 class Tree(NamedTuple):
@@ -121,4 +139,4 @@ class Tree(NamedTuple):
     twin: IndexArray
     patch: IndexArray
     boxes: FloatArray
-    level: NDArray[np.int64]
+    level: IntArray

@@ -19,11 +19,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import FloatArray, IntArray
 
 __all__ = ["Potential", "areas", "gradients", "hessian", "potentials", "volumes"]
 
-IntArray = NDArray[np.int64]
 Potential = NDArray[np.float64]  # (3,) gradient a of the fluid's potential energy density, or zeros
 
 # Sign of the derivative along corner i, then corner j: d2N = x_i' x x_j' for j after i.

@@ -14,12 +14,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import FloatArray, IntArray
 from .energies import areas
 
 __all__ = ["Cut", "cut_necks"]
 
-IntArray = NDArray[np.int64]
 Cycle = tuple[int, ...]
 
 # A piece counts as hanging on a neck if its area is so many times that of the cap. Less is the base of a

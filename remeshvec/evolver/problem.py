@@ -12,14 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
 
 from ..core.check import as_array, as_indices, as_mask, as_mesh, positive_number, which
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
 from ..mesh.repair import count_edges
 from .energies import areas, gradients, hessian, potentials, volumes
 
 __all__ = ["CapillaryProblem", "Forces"]
-
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.check import positive_number
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import FloatArray, IntArray
 from ..errors import MeshFormatError, OptionError
 from .errors import EvolverError
 from .minimize import Minimum, measured, restore_volumes
@@ -27,7 +27,6 @@ from .problem import CapillaryProblem
 
 __all__ = ["EvolverBackend", "read_dump", "write_fe"]
 
-IntArray = NDArray[np.int64]
 
 # Gradient steps before Newton steps are tried, and those that count as a step of the flow.
 _WARM_UP, _GRADIENT_STEPS = 5, 20

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel
-from ..core.vocabulary import NONE, FloatArray, IndexArray
+from ..core.vocabulary import NONE, BoolArray, FloatArray, IndexArray, IntArray
 from ..mesh.walk import next_halfedge
 
 __all__ = ["BORDER", "CLEAN", "HARD", "STRONG", "SURE", "WEAK", "count_chains", "keep_chains"]
@@ -44,10 +44,10 @@ SLACK = 1.0 - 1e-9
 def keep_chains(
     X: FloatArray,
     origin: IndexArray,
-    edges: NDArray[np.int64],
+    edges: IntArray,
     rank: NDArray[np.int8],
     mean_edge: float,
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Tell which candidate edges are creases.
 
     The boundary stays. At each vertex the others that meet are paired, straightest first; linked runs
@@ -77,9 +77,7 @@ def keep_chains(
     return kept
 
 
-def count_chains(
-    X: FloatArray, origin: IndexArray, twin: IndexArray, edges: NDArray[np.int64]
-) -> int:
+def count_chains(X: FloatArray, origin: IndexArray, twin: IndexArray, edges: IntArray) -> int:
     """Count the chains among feature edges, those that lie on the boundary alone left out."""
     counts = twin[edges] != NONE
     rank = np.full(len(edges), HARD, np.int8)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from math import acos, degrees, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel
 from ..core.geometry import distance_squared
-from ..core.vocabulary import NONE, FloatArray, IndexArray
+from ..core.vocabulary import NONE, BoolArray, FloatArray, IndexArray
 from ..mesh.walk import next_halfedge
 from .curves import Curves
 
@@ -42,7 +41,7 @@ def find_corners(
     twin: IndexArray,
     curves: Curves,
     angle: float | str | None,
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Find the corners of feature curves at the scale of the target length.
 
     A vertex with one, three or more feature edges is one. A vertex inside a curve is one if the

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..core.compiler import inlined, threaded
 from ..core.geometry import angle_from_cosine, area_vector, distance_squared
-from ..core.vocabulary import MAX_VALENCE, NONE, FloatArray, IndexArray
+from ..core.vocabulary import MAX_VALENCE, NONE, BoolArray, FloatArray, IndexArray, IntArray
 from ..mesh.walk import previous_halfedge
 from .chains import BORDER, CLEAN, HARD, STRONG, SURE, WEAK, count_chains, keep_chains
 from .dihedral import (
@@ -59,12 +59,12 @@ def find_creases(
     origin: IndexArray,
     twin: IndexArray,
     vertex_halfedge: IndexArray,
-    hard: NDArray[np.bool_],
+    hard: BoolArray,
     angle: float | str | None,
     mean_edge: float,
     turns: DihedralAngles | None = None,
     parallel: bool = False,
-) -> tuple[NDArray[np.bool_], dict[str, int]]:
+) -> tuple[BoolArray, dict[str, int]]:
     """Find the feature edges of a mesh.
 
     Parameters
@@ -123,15 +123,13 @@ def least_turn(angle: float | str | None) -> float:
     return float(angle) + ANGLE_TOLERANCE
 
 
-def _cosines(
-    normals: FloatArray, twin: IndexArray, edges: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _cosines(normals: FloatArray, twin: IndexArray, edges: IntArray) -> FloatArray:
     """Cosines of the turns across edges; the same bits as `face_cosine`."""
     a, b = normals[edges // 3].T, normals[twin[edges] // 3].T
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-def _one_of_each(is_feature: NDArray[np.bool_], twin: IndexArray) -> NDArray[np.int64]:
+def _one_of_each(is_feature: BoolArray, twin: IndexArray) -> IntArray:
     """List one half-edge of every feature edge."""
     edges = np.flatnonzero(is_feature)
     return edges[twin[edges] < edges]
@@ -140,12 +138,12 @@ def _one_of_each(is_feature: NDArray[np.bool_], twin: IndexArray) -> NDArray[np.
 def _creases(
     mesh: tuple[FloatArray, IndexArray, IndexArray, IndexArray],
     turns: DihedralAngles,
-    is_hard: NDArray[np.bool_],
-    found: NDArray[np.int64],
+    is_hard: BoolArray,
+    found: IntArray,
     mean_edge: float,
     counts: dict[str, int],
     parallel: bool,
-) -> NDArray[np.int64]:
+) -> IntArray:
     """Of the edges that turn far enough, keep the creases; counts the others by reason."""
     X, origin, twin, _ = mesh
     if not len(found):
@@ -170,7 +168,7 @@ def _creases(
 def _noise(
     mesh: tuple[FloatArray, IndexArray, IndexArray, IndexArray],
     turns: DihedralAngles,
-    found: NDArray[np.int64],
+    found: IntArray,
     parallel: bool,
 ) -> FloatArray:
     """Mean turn, in degrees, across the smoothest side of each face at the ends of edges.

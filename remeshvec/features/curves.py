@@ -9,10 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.compiler import kernel
-from ..core.vocabulary import NONE, IndexArray
+from ..core.vocabulary import NONE, BoolArray, IndexArray
 from ..mesh.walk import next_halfedge
 
 __all__ = ["Curves", "link_chains"]
@@ -43,9 +42,7 @@ class Curves(NamedTuple):
     degree: IndexArray
 
 
-def link_chains(
-    origin: IndexArray, twin: IndexArray, is_feature: NDArray[np.bool_], n: int
-) -> Curves:
+def link_chains(origin: IndexArray, twin: IndexArray, is_feature: BoolArray, n: int) -> Curves:
     """Link feature half-edges to chains.
 
     Parameters

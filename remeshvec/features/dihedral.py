@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel, threaded
 from ..core.geometry import area_vector, distance_squared
-from ..core.vocabulary import NONE, FloatArray, IndexArray
+from ..core.vocabulary import NONE, FloatArray, IndexArray, IntArray
 from ..mesh.walk import next_halfedge
 
 __all__ = [
@@ -58,7 +58,7 @@ class DihedralAngles(NamedTuple):
     normals: FloatArray
     state: NDArray[np.uint8]
     slivers: bool
-    edges: NDArray[np.int64]
+    edges: IntArray
 
 
 def find_dihedral_angles(

@@ -7,11 +7,10 @@ that its two sides, and all sheets, look for a point in the same way.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel
 from ..core.geometry import closest_on_segment, distance_squared, point
-from ..core.vocabulary import NONE, FloatArray, IndexArray
+from ..core.vocabulary import NONE, BoolArray, FloatArray, IndexArray
 from ..mesh.walk import ends_of, next_halfedge
 from .curves import Curves
 
@@ -55,7 +54,7 @@ def name_edges(
 
 
 def join_edges(
-    name: IndexArray, curves: Curves, origin: IndexArray, is_corner: NDArray[np.bool_]
+    name: IndexArray, curves: Curves, origin: IndexArray, is_corner: BoolArray
 ) -> IndexArray:
     """Join the edges of curves to polylines that end at corners.
 

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core import arguments
+from ..core.vocabulary import FloatArray, IntArray
 from ..errors import MeshFormatError
 from .guards import MeshCopy, check_obj, check_off, check_stl, checked_bytes
 from .ply_guard import check_ply, parse_header
@@ -35,8 +36,6 @@ __all__ = [
     "write_mesh",
 ]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 PATHS = str | os.PathLike[str]
 

@@ -9,12 +9,11 @@ import json
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..core.vocabulary import FloatArray, IntArray
 
 __all__ = ["WRITERS"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 MAX_STL = np.finfo(np.float32).max
 

@@ -6,13 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.vocabulary import EQUILATERAL_AREA, FloatArray
 from ..measures.quality import Elements, Quality
 
 __all__ = ["build_charts"]
 
-FloatArray = NDArray[np.float64]
 
 BARS = 50
 MOST_VALENCE = 12  # larger ones are counted with it
@@ -38,7 +37,7 @@ def build_charts(
         JSON-ready: centres of the bars, their width, counts and percentages before and after, the
         ideal value, and words.
     """
-    unit_area = np.sqrt(3) / 4 * length**2
+    unit_area = EQUILATERAL_AREA * length**2
     return [
         _lengths_like(
             "Edge lengths", "edge length / L", elements, lambda one: one.edge_lengths / length

@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.vocabulary import EQUILATERAL_AREA, FloatArray, IntArray
 from ..measures.quality import Elements, Quality
 from ..viz.pictures import UP, Camera, three_quarter_view
 
 __all__ = ["COLOURINGS", "MOST_EDGED", "MOST_FACES", "Views", "build_views"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # At these limits Chromium draws a page within 4 to 7 seconds on two cores without a graphics card, and
 # the page has 16 MB.
@@ -124,7 +123,7 @@ def _mesh(
     """Return one mesh in base64: coordinates, indices, and a byte a face for each colouring."""
     used, F = np.unique(mesh.F[kept], return_inverse=True)
     with np.errstate(divide="ignore"):  # no area: as small as can be shown
-        doublings = np.log2(mesh.areas[kept] / (np.sqrt(3) / 4 * length**2))
+        doublings = np.log2(mesh.areas[kept] / (EQUILATERAL_AREA * length**2))
     levels = {
         "shape": mesh.radius_ratios[kept],
         "angle": mesh.angles[kept].min(axis=1, initial=60.0) / 60,

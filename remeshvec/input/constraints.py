@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.arguments import choice, number
 from ..core.check import as_array, as_indices, as_mask
-from ..core.vocabulary import NONE, IndexArray, Mesh
+from ..core.vocabulary import EQUAL_DATA, NONE, BoolArray, IndexArray, Mesh
 from ..errors import OptionError
 from ..mesh.edges import edge_keys
 from ..mesh.walk import ends_of
@@ -19,12 +19,6 @@ from .options import RemeshOptions
 __all__ = ["BOUNDARY_MODES", "ConstraintMasks", "Constraints", "make_constraints"]
 
 BOUNDARY_MODES = ("free", "split", "fixed")
-
-BoolArray = NDArray[np.bool_]
-
-# Data on corners that differ by less than this share of their range are equal: single precision has
-# 6e-8, and texture coordinates of one vertex are often computed once for every face.
-_EQUAL_SHARE = 1e-6
 
 
 class ConstraintMasks(NamedTuple):
@@ -246,7 +240,7 @@ def _differ(
     a, b = (flat[corner // 3 * step + np.minimum(corner % 3, step - 1)] for corner in (one, two))
     if values.dtype.kind != "f":
         return np.asarray((a != b).any(axis=1))
-    return np.asarray((abs(a - b) > _EQUAL_SHARE * np.ptp(values, axis=(0, 1))).any(axis=1))
+    return np.asarray((abs(a - b) > EQUAL_DATA * np.ptp(values, axis=(0, 1))).any(axis=1))
 
 
 def _feature_angle(value: Any) -> float | str | None:

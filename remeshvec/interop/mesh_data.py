@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.vocabulary import EQUAL_DATA
+
 __all__ = ["Data", "MeshData", "carry", "corner_values", "split_vertices"]
 
 Data = dict[str, NDArray[Any]]
-
-# Numbers on corners of one vertex that differ by less than this share of their range are one number.
-_SAME_DATA = 1e-6
 
 
 @dataclass
@@ -160,7 +159,7 @@ def split_vertices(
 def _data_agree(values: NDArray[Any], one: NDArray[Any], two: NDArray[Any]) -> NDArray[np.bool_]:
     if values.dtype.kind not in "fc":
         return np.asarray((values[one] == values[two]).all(axis=1))
-    near = _SAME_DATA * np.ptp(values) if np.isfinite(values).all() else 0.0
+    near = EQUAL_DATA * np.ptp(values) if np.isfinite(values).all() else 0.0
     with np.errstate(invalid="ignore"):
         is_near = abs(values[one] - values[two]) <= near
     return np.asarray(

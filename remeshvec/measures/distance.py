@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..core.arguments import count
 from ..core.check import as_mesh
+from ..core.vocabulary import FloatArray, IntArray
 
 __all__ = ["SurfaceDistance", "surface_distance"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # The additive recurrence with the plastic number: the least discrepancy known for a plane sequence
 # that needs no length beforehand and no random state (M. Roberts, "R2", 2018).

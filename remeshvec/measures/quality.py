@@ -10,15 +10,14 @@ from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..core.arguments import number
 from ..core.check import as_mesh
+from ..core.vocabulary import BoolArray, FloatArray, IntArray
 
 __all__ = ["Elements", "Quality", "elements", "quality", "side_by_side"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 SHORTEST_IN_BAND, LONGEST_IN_BAND = 4 / 5, 4 / 3  # the thresholds of Botsch and Kobbelt [2004]
 NARROW_ANGLE = 30.0  # degrees; below it a triangle counts as narrow
@@ -217,7 +216,7 @@ class _Corners(NamedTuple):
     squared: FloatArray  # (m, 3), of the edge opposite each corner
     angle: FloatArray  # (m, 3), degrees
     area: FloatArray  # (m,)
-    is_flat: NDArray[np.bool_]  # (m,), no area but for rounding
+    is_flat: BoolArray  # (m,), no area but for rounding
 
 
 class _Edges(NamedTuple):
@@ -236,11 +235,11 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-def _is_repeated(F: IntArray) -> NDArray[np.bool_]:
+def _is_repeated(F: IntArray) -> BoolArray:
     return (F[:, 0] == F[:, 1]) | (F[:, 1] == F[:, 2]) | (F[:, 2] == F[:, 0])
 
 
-def _referenced(F: IntArray, n: int) -> tuple[NDArray[np.bool_], IntArray]:
+def _referenced(F: IntArray, n: int) -> tuple[BoolArray, IntArray]:
     """Return the mask of the vertices that a face uses, and the faces renumbered to them."""
     used = np.zeros(n, dtype=bool)
     used[F] = True
@@ -385,13 +384,13 @@ def _next(h: IntArray) -> IntArray:
     return np.where(h % 3 == 2, h - 2, h + 1)
 
 
-def _touched(index: IntArray, n: int) -> NDArray[np.bool_]:
+def _touched(index: IntArray, n: int) -> BoolArray:
     mask = np.zeros(n, dtype=bool)
     mask[index] = True
     return mask
 
 
-def _share_of(mask: NDArray[np.bool_]) -> float:
+def _share_of(mask: BoolArray) -> float:
     return float(mask.mean()) if len(mask) else 0.0
 
 

@@ -108,17 +108,17 @@ def _group(stage: int) -> int:
 @inlined
 def vertex_range(blocks, stage, k):
     """Vertices that block ``k`` of a stage may touch."""
-    return _range(blocks.vertex, stage, k)
+    return _stage_range(blocks.vertex, stage, k)
 
 
 @inlined
 def face_range(blocks, stage, k):
     """Faces that block ``k`` of a stage may remove and make."""
-    return _range(blocks.face, stage, k)
+    return _stage_range(blocks.face, stage, k)
 
 
 @inlined
-def _range(ends, stage, k):
+def _stage_range(ends, stage, k):
     if stage == SHIFTED:
         return (ends[k] + ends[k + 1]) // 2, (ends[k + 1] + ends[k + 2]) // 2
     first, end = _groups(ends.size - 1, stage, k)

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.vocabulary import IntArray
+
 __all__ = ["components", "edge_keys", "halfedge_ends", "unique_edges"]
 
 
@@ -15,7 +17,7 @@ def halfedge_ends(F: NDArray[Any]) -> NDArray[Any]:
     return np.stack([F.ravel(), F[:, [1, 2, 0]].ravel()])
 
 
-def edge_keys(ends: NDArray[Any], n: int) -> NDArray[np.int64]:
+def edge_keys(ends: NDArray[Any], n: int) -> IntArray:
     """One number per edge, whichever way it runs, from its ends (2, ...) among n vertices."""
     return np.minimum(*ends).astype(np.int64) * n + np.maximum(*ends)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..core.compiler import inlined, threaded
 from ..core.ranges import even_ranges, per_range
 from ..core.threads import share
-from ..core.vocabulary import FloatArray, IndexArray
+from ..core.vocabulary import FloatArray, IndexArray, IntArray
 
 __all__ = ["MeshFrame", "Ordered", "order_mesh", "survey"]
 
@@ -136,7 +136,7 @@ def _survey(span, cuts, V, F, faces, boxes, repeated):
 
 
 def _sorted_keys(
-    V: FloatArray, F: IndexArray, parallel: bool, cuts: NDArray[np.int64], frame: MeshFrame
+    V: FloatArray, F: IndexArray, parallel: bool, cuts: IntArray, frame: MeshFrame
 ) -> tuple[NDArray[np.uint64], int]:
     """Return a key a face, its index in the low bits, in order; and how many bits the index has."""
     index_bits = max(1, (len(F) - 1).bit_length())
@@ -168,7 +168,7 @@ def _sorted_keys(
     return grouped, index_bits
 
 
-def _sort_parts(span: tuple[int, int], bounds: NDArray[np.int64], keys: NDArray[np.uint64]) -> None:
+def _sort_parts(span: tuple[int, int], bounds: IntArray, keys: NDArray[np.uint64]) -> None:
     for k in range(*span):
         keys[bounds[k] : bounds[k + 1]].sort()
 

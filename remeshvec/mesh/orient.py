@@ -8,10 +8,9 @@ Volume decides nothing: a closed part whose faces point inwards stays so.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.compiler import kernel
-from ..core.vocabulary import NONE, IndexArray
+from ..core.vocabulary import NONE, BoolArray, IndexArray
 from .twins import match_halfedges
 
 __all__ = ["orient_faces"]
@@ -19,7 +18,7 @@ __all__ = ["orient_faces"]
 _UNSEEN = -1
 
 
-def orient_faces(F: IndexArray, n: int) -> tuple[IndexArray, NDArray[np.bool_]]:
+def orient_faces(F: IndexArray, n: int) -> tuple[IndexArray, BoolArray]:
     """Give faces that share an edge with nobody else the same winding.
 
     In each component (faces connected through edges of exactly two faces) the winding of most of its

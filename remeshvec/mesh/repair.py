@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import FloatArray, IntArray
 
 __all__ = [
     "count_edges",
@@ -25,7 +25,7 @@ Indices = NDArray[np.intp]
 _WEIGHTS = 0.7320508075688772, 0.23606797749978969
 
 
-def count_edges(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
+def count_edges(F: IntArray) -> tuple[IntArray, NDArray[np.intp]]:
     """Return the edges (k, 2), smaller end first, in order, and how many faces have each."""
     edges = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
     return np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)

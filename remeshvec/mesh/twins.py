@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel, threaded
 from ..core.ranges import even_ranges, per_range
-from ..core.vocabulary import CURVE, INNER, NONE, IndexArray
+from ..core.vocabulary import CURVE, INNER, NONE, IndexArray, IntArray
 from .walk import next_halfedge, previous_halfedge
 
 __all__ = [
@@ -98,7 +98,7 @@ def match_halfedges(origin: IndexArray, n: int, parallel: bool, by_winding: bool
     return Matched(twin, curve, first, valence_excess, kind, found)
 
 
-def _vertex_ranges(origin: IndexArray, n: int, faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def _vertex_ranges(origin: IndexArray, n: int, faces: IntArray) -> IntArray:
     """Vertices that belong to ranges of faces: those used there first, if numbered by first use.
 
     Otherwise any ranges serve, if less well.

@@ -7,14 +7,12 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.check import as_mask, as_mesh, positive_count, which
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import BoolArray, FloatArray
 from ..errors import OptionError
 from .laplacians import Area, cotangent_matrix, polyharmonic_matrix, vertex_areas
 from .solver import LaplacianSolver
 
 __all__ = ["Polyharmonic", "fair"]
-
-BoolArray = NDArray[np.bool_]
 
 
 def fair(

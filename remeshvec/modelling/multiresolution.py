@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.check import as_mesh, positive_number
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import FloatArray, IntArray
 from ..pipeline.remesh import remesh
 from .editing import Transform, as_transform, split_vertices
 from .fairing import Polyharmonic
@@ -26,7 +26,6 @@ from .motion import part_of_motion, rotations_between
 
 __all__ = ["EditedSurface", "MultiresolutionEditor"]
 
-IntArray = NDArray[np.int64]
 
 # The base is remeshed where edges of the support leave this range of lengths [the report's thresholds],
 # or an angle falls below so many degrees.

@@ -7,14 +7,12 @@ from numpy.typing import NDArray
 
 from ..core.compiler import compile_notice
 from ..core.threads import thread_scope
-from ..core.vocabulary import NONE, FloatArray, IndexArray, Mesh
+from ..core.vocabulary import NONE, FloatArray, IndexArray, IntArray, Mesh
 from ..reference.bvh import build_tree, closest_points
 from .records import Births, Provenance
 from .sides import locate_corners
 
 __all__ = ["corner_births", "face_births", "images", "vertex_births"]
-
-IntArray = NDArray[np.int64]
 
 
 def vertex_births(p: Provenance) -> Births:

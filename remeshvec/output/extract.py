@@ -17,7 +17,17 @@ from ..core.compiler import compile_notice, threaded
 from ..core.lazy import Lazy
 from ..core.ranges import even_ranges, per_range
 from ..core.threads import thread_scope
-from ..core.vocabulary import DEAD, FIXED, FROZEN, NONE, Blocks, FloatArray, IndexArray, Mesh
+from ..core.vocabulary import (
+    DEAD,
+    FIXED,
+    FROZEN,
+    NONE,
+    Blocks,
+    FloatArray,
+    IndexArray,
+    IntArray,
+    Mesh,
+)
 from ..input.constraints import Constraints
 from ..input.prepare import Prepared
 from ..mesh.blocks import make_blocks
@@ -26,17 +36,13 @@ from ..mesh.repair import weld_vertices
 from ..mesh.walk import ends_of
 from ..operations.project import locate_vertices
 from ..reference.build import FeaturedReference
+from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_vertices
 from ..reference.surface import Reference
 from .records import Births, Provenance
 
 __all__ = ["Output", "extract", "locate"]
 
-IntArray = NDArray[np.int64]
-
-# Vertices that are not on the input are looked for in the whole of their patch where a walk ends
-# farther from them than this share of the mean target length.
-_BIRTH_TRUST = 0.05
 
 # Vertices that are on the input are found within this distance, in a frame of an extent of 1 to 2.
 _ON_INPUT = 1e-10
@@ -66,7 +72,7 @@ def locate(mesh: Mesh, reference: Reference, on_input: bool, parallel: bool) -> 
         Weights of the corners of the face of ``mesh.birth``. Vertices that are not ``on_input`` are
         looked for beyond where a walk leads.
     """
-    trust = np.inf if on_input else _BIRTH_TRUST * float(mesh.X[:, 3].mean())
+    trust = np.inf if on_input else WALK_TRUST * float(mesh.X[:, 3].mean())
     near = _ON_INPUT if on_input else None
     return locate_vertices(mesh, make_blocks(mesh), reference, trust, parallel, near)
 
@@ -134,12 +140,12 @@ def extract(
             prepared,
             featured,
             len(V),
-            _BIRTH_TRUST * prepared.scale * float(lengths.mean()),
+            WALK_TRUST * prepared.scale * float(lengths.mean()),
             threads,
         ),
         partial(_spread_to_input, len(V), born_at, fixed, prepared.representative),
         partial(_spread_to_input, n_faces, *face_map),
-        partial(_feature_edges, ends),
+        partial(_sorted_pairs, ends),
         partial(np.unique, fixed),
         lengths,
     )
@@ -338,7 +344,7 @@ def _spread_to_input(
     return spread if representative is None else spread[representative]
 
 
-def _feature_edges(ends: NDArray[Any]) -> IntArray:
+def _sorted_pairs(ends: NDArray[Any]) -> IntArray:
     """Edges from their ends (2, k), each once, in order."""
     if not ends.size:
         return np.empty((0, 2), np.int64)

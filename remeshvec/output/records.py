@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
 from ..core.lazy import Lazy
-from ..core.vocabulary import FloatArray, IndexArray, Mesh
+from ..core.vocabulary import BoolArray, FloatArray, IndexArray, Mesh
 from ..reference.surface import Reference
 
-__all__ = ["Births", "IntArray", "Provenance"]
-
-
-IntArray = NDArray[np.int64]
+__all__ = ["Births", "Provenance"]
 
 
 # Faces or half-edges, and weights of the three corners of their faces.
@@ -33,7 +29,7 @@ class Provenance(NamedTuple):
     names: IndexArray  # (k,) of those curves' edges
     face_source: NDArray[Any]  # faces of the reference in the input
     vertex_source: IndexArray  # vertices of the reference in the input
-    flipped: NDArray[np.bool_] | None  # faces of the input whose corners 1 and 2 were swapped
+    flipped: BoolArray | None  # faces of the input whose corners 1 and 2 were swapped
     representative: IndexArray | None  # the vertex that stands for each of the input; None: itself
     n_in: int
     trust: float

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from ..core.arguments import choice
 from ..core.lazy import Lazy, LazyRecipe
+from ..core.vocabulary import FloatArray, IntArray
+from .records import Births
 from .report import Report
 from .transfer import TRANSFER_METHODS, as_matrix, as_values, interpolate, pick, to_numpy
 
 __all__ = ["RemeshResult"]
-
-IntArray = NDArray[np.int64]
-FloatArray = NDArray[np.float64]
-Births = tuple[NDArray[Any], FloatArray]
 
 _PLACES = ("vertices", "faces", "corners")
 

@@ -14,10 +14,21 @@ from numpy.typing import NDArray
 
 from ..core.compiler import kernel
 from ..core.geometry import closest_on_segment
-from ..core.vocabulary import CURVE, DEAD, FIXED, NON_MANIFOLD, NONE, FloatArray, IndexArray, Mesh
+from ..core.vocabulary import (
+    CURVE,
+    DEAD,
+    FIXED,
+    NON_MANIFOLD,
+    NONE,
+    BoolArray,
+    FloatArray,
+    IndexArray,
+    IntArray,
+    Mesh,
+)
 from ..mesh.walk import ends_of
 from ..reference.bvh import corner, face_distance, walk_to
-from .records import Births, IntArray, Provenance
+from .records import Births, Provenance
 
 __all__ = ["locate_corners"]
 
@@ -82,7 +93,7 @@ def _edges_beside(p: Provenance, h: IntArray, birth: IndexArray) -> IntArray:
 
 
 def _candidates(
-    p: Provenance, h: IntArray, birth: IndexArray, is_fixed: NDArray[np.bool_]
+    p: Provenance, h: IntArray, birth: IndexArray, is_fixed: BoolArray
 ) -> tuple[IntArray, IntArray]:
     """Half-edges of the reference that may be meant: pairs of a place in ``h`` and one of them.
 
@@ -207,7 +218,7 @@ def _keep_sides(
     return face, weights
 
 
-def _faces_beside_slits(p: Provenance) -> NDArray[np.bool_]:
+def _faces_beside_slits(p: Provenance) -> BoolArray:
     """Faces of the reference with a corner on a curve that has the same patch on both sides."""
     origin = p.reference.origin
     order = np.lexsort((p.reference.tree.patch[p.features // 3], p.names))
@@ -218,7 +229,7 @@ def _faces_beside_slits(p: Provenance) -> NDArray[np.bool_]:
     return np.asarray(on_non_manifold[origin].reshape(-1, 3).any(axis=1))
 
 
-def _vertices_beside(mesh: Mesh, v: IntArray) -> NDArray[np.bool_]:
+def _vertices_beside(mesh: Mesh, v: IntArray) -> BoolArray:
     """Mask of the vertices of all faces around some."""
     is_one = np.zeros(len(mesh.X), np.bool_)
     is_one[v] = True

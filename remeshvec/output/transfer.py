@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.vocabulary import FloatArray, IntArray
 from ..errors import OptionError
 
 __all__ = [
@@ -21,9 +22,6 @@ __all__ = [
 ]
 
 TRANSFER_METHODS = ("auto", "linear", "nearest")
-
-IntArray = NDArray[np.int64]
-FloatArray = NDArray[np.float64]
 
 
 def is_tensor(value: Any) -> bool:

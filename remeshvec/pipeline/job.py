@@ -9,7 +9,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.vocabulary import DEAD, FloatArray, Mesh
+from ..core.vocabulary import DEAD, EQUILATERAL_AREA, FloatArray, Mesh
 from ..errors import OptionError
 from ..input.constraints import Constraints
 from ..input.prepare import Prepared
@@ -174,7 +174,7 @@ def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
         raise OptionError(
             f"n_{noun} = {wanted:,} is more than max_faces = {job.sizing.max_faces:,}"
         )
-    L = sqrt(job.size.area / faces / (sqrt(3.0) / 4.0)) / job.prepared.scale
+    L = sqrt(job.size.area / faces / EQUILATERAL_AREA) / job.prepared.scale
     best = None
     for _ in range(_TRIES):
         done = job.run(L)

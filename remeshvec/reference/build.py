@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.compiler import kernel
 from ..core.vocabulary import (
@@ -19,7 +18,9 @@ from ..core.vocabulary import (
     INNER,
     NON_MANIFOLD,
     NONE,
+    BoolArray,
     IndexArray,
+    IntArray,
     Mesh,
 )
 from ..features.corners import find_corners
@@ -34,8 +35,6 @@ from .bvh import Surface
 from .surface import Reference
 
 __all__ = ["FeaturedReference", "build_reference"]
-
-BoolArray = NDArray[np.bool_]
 
 
 class FeaturedReference(NamedTuple):
@@ -130,7 +129,7 @@ def _lengthen_beside(mesh: Mesh, vertex_source: IndexArray, frozen: BoolArray) -
         np.maximum(mesh.X[:, 3], longest[vertex_source], out=mesh.X[:, 3])
 
 
-def _walls(twin: IndexArray, held: BoolArray) -> NDArray[np.int64]:
+def _walls(twin: IndexArray, held: BoolArray) -> IntArray:
     """Half-edges between faces that stay and faces that do not."""
     h = np.flatnonzero(np.repeat(held, 3) & (twin != NONE))
     h = h[~held[twin[h] // 3]]

@@ -20,6 +20,7 @@ from ..mesh.walk import next_halfedge, previous_halfedge
 
 __all__ = [
     "STACK",
+    "WALK_TRUST",
     "Surface",
     "build_tree",
     "closest_face",
@@ -38,6 +39,11 @@ _ARITY = 4  # boxes in a node
 _WALK = 64  # steps of a walk
 _FAN = 32  # faces around a corner that one step looks at
 _POINTS = 256  # points that follow each other in one query
+
+# A walk that ends this close to the point, as a share of the target length, is trusted: the rest of the
+# patch is not searched.
+WALK_TRUST = 0.05
+
 STACK = 64  # boxes waiting: 3 a level and 16 levels hold 4e9 leaves
 
 

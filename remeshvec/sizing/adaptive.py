@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..core.arguments import number
 from ..core.compiler import inlined, kernel
 from ..core.geometry import area_vector
-from ..core.vocabulary import FloatArray, IndexArray
+from ..core.vocabulary import EQUILATERAL_AREA, BoolArray, FloatArray, IndexArray
 from ..errors import OptionError
 from .curvature import largest_curvature
 from .gradation import limit_gradation
@@ -90,7 +90,7 @@ def adaptive_lengths(
     origin: IndexArray,
     twin: IndexArray,
     vertex_halfedge: IndexArray,
-    is_feature: NDArray[np.bool_],
+    is_feature: BoolArray,
     tolerance: float,
     shortest: float,
     longest: float,
@@ -194,7 +194,7 @@ def expected_faces(X: FloatArray, origin: IndexArray, lengths: FloatArray) -> fl
     origin : (3 m,) int32
     lengths : (n,) float64
     """
-    return float(_integrate_density(X, origin, lengths)) / (sqrt(3.0) / 4.0)
+    return float(_integrate_density(X, origin, lengths)) / EQUILATERAL_AREA
 
 
 @inlined

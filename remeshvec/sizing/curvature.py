@@ -13,11 +13,10 @@ from __future__ import annotations
 from math import exp, log, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel
 from ..core.geometry import area_vector, distance_squared, tangent_basis
-from ..core.vocabulary import NONE, FloatArray, IndexArray
+from ..core.vocabulary import NONE, BoolArray, FloatArray, IndexArray
 from ..mesh.walk import next_halfedge, previous_halfedge
 
 __all__ = ["largest_curvature"]
@@ -41,7 +40,7 @@ def largest_curvature(
     origin: IndexArray,
     twin: IndexArray,
     vertex_halfedge: IndexArray,
-    is_feature: NDArray[np.bool_],
+    is_feature: BoolArray,
     rounds: int = _SMOOTHING_ROUNDS,
 ) -> FloatArray:
     """Largest absolute principal curvature at every vertex.

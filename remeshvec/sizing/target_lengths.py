@@ -6,12 +6,20 @@ from math import inf, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.arguments import number
 from ..core.compiler import threaded
 from ..core.geometry import area_vector, distance_squared
-from ..core.vocabulary import DEAD, FROZEN, FloatArray, IndexArray, Mesh
+from ..core.vocabulary import (
+    DEAD,
+    DEFAULT_LENGTH_FACTOR,
+    EQUILATERAL_AREA,
+    FROZEN,
+    BoolArray,
+    FloatArray,
+    IndexArray,
+    Mesh,
+)
 from ..errors import MeshInputError, OptionError
 from ..features.creases import find_creases
 from ..input.constraints import ConstraintMasks
@@ -33,9 +41,6 @@ __all__ = [
 # Longest target length in the frame of `Prepared`, where the mesh has an extent below 2: longer ones
 # mean the same, and their squares might overflow.
 _LONGEST = 1e6
-
-# Edges of a remeshed surface are on average as long as the target, and its faces about equilateral.
-_EQUILATERAL = sqrt(3.0) / 4.0
 
 
 # Edges spread around their target, and errors go with their square. Of the faces made for this share of
@@ -162,7 +167,9 @@ def set_lengths(
         lengths = _adaptive(prepared, measures, L, marks.hard, feature_angle, _ADAPTIVE_SHARE)
     else:
         requested = (
-            target_lengths(V, L) if L is not None else 0.9 * measures.mean_edge / prepared.scale
+            target_lengths(V, L)
+            if L is not None
+            else DEFAULT_LENGTH_FACTOR * measures.mean_edge / prepared.scale
         )
         if not isinstance(requested, np.ndarray) and max_deviation is None:
             return _set_one(
@@ -178,13 +185,13 @@ def set_lengths(
     expected = expected_faces(X, prepared.mesh.origin, lengths)
     shortest, longest = float(lengths.min()), float(lengths.max())
     _check_output(prepared, measures, shortest, longest, expected, max_faces)
-    return shortest if shortest == longest else sqrt(measures.area / (expected * _EQUILATERAL))
+    return shortest if shortest == longest else sqrt(measures.area / (expected * EQUILATERAL_AREA))
 
 
 def _set_one(prepared: Prepared, measures: MeshSize, length: float, max_faces: int) -> float:
     """Set the same length everywhere."""
     prepared.mesh.X[:, 3] = length
-    face = _EQUILATERAL * length * length
+    face = EQUILATERAL_AREA * length * length
     expected = measures.area / face if face > 0.0 else inf
     _check_output(prepared, measures, length, length, expected, max_faces)
     return length
@@ -195,7 +202,7 @@ def _near_input(
     measures: MeshSize,
     lengths: FloatArray,
     distance: float,
-    hard: NDArray[np.bool_],
+    hard: BoolArray,
     feature_angle: float | str | None,
 ) -> FloatArray:
     """Cut lengths to those whose chords stay near, and to no less than half the input's own edges."""
@@ -229,7 +236,7 @@ def _adaptive(
     prepared: Prepared,
     measures: MeshSize,
     spec: Adaptive,
-    hard: NDArray[np.bool_],
+    hard: BoolArray,
     feature_angle: float | str | None,
     share: float,
 ) -> FloatArray:

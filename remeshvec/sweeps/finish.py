@@ -13,11 +13,11 @@ from ..operations.project import project_vertices
 from ..operations.split import split_edges
 from ..operations.unfold import undo_folds
 from ..operations.untangle import approach_vertices, untangle_vertices
+from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_copies
 from ..sizing.target_lengths import bound_gradation
 from .deviation import DeviationGuard, edges_to_refine
 from .guard import Guard
-from .phases import TRUST
 from .sheets import separate_sheets
 from .work import Work
 
@@ -78,7 +78,7 @@ def polish(work: Work) -> None:
     reference, parallel = work.featured.reference, work.is_parallel
     if recipe.project:
         before = mesh.X.copy()
-        project_vertices(mesh, blocks, reference, TRUST, parallel)
+        project_vertices(mesh, blocks, reference, WALK_TRUST, parallel)
         undo_folds(mesh, blocks, before, parallel)
     if recipe.untangle_rounds:
         cosine = cos(radians(recipe.untangle_angle))
@@ -123,7 +123,7 @@ def refine(work: Work) -> None:
         if not 0 < len(edges) <= _ROUGH * work.n_faces:
             break
         work.put(split_edges(work.mesh, work.blocks, edges, parallel))
-        project_vertices(work.mesh, work.blocks, reference, TRUST, parallel)
+        project_vertices(work.mesh, work.blocks, reference, WALK_TRUST, parallel)
         flip_edges(work.mesh, work.blocks, flips, parallel)
 
 

@@ -21,18 +21,15 @@ from ..operations.siblings import collapse_siblings
 from ..operations.slide import slide_vertices
 from ..operations.split import MAX_ROUNDS, SPARE, split_long_edges
 from ..operations.unfold import undo_folds
+from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import find_non_manifold_edges, non_manifold_copies
 from ..sizing.target_lengths import bound_gradation
 from .plan import Sweep
 from .work import Work
 
-__all__ = ["TRUST", "collapse", "flip", "project", "relax", "split"]
+__all__ = ["collapse", "flip", "project", "relax", "split"]
 
 Phase = Callable[[Work, Sweep], None]
-
-# Vertices that a walk brings this close to the input, as a share of the target length, are not checked
-# against the whole of their patch.
-TRUST = 0.05
 
 # Above this share of dead faces the holes are closed, because every loop reads them.
 _SPARSE = 1.0 / 3.0
@@ -132,7 +129,7 @@ def project(work: Work, sweep: Sweep) -> None:
     """Put vertices back onto the input, take back moves that fold, and read target lengths there."""
     mesh, blocks, reference = work.mesh, work.blocks, work.featured.reference
     if sweep.projects:
-        project_vertices(mesh, blocks, reference, TRUST, work.is_parallel)
+        project_vertices(mesh, blocks, reference, WALK_TRUST, work.is_parallel)
     if work.featured.has_curves and work.before is not None:
         undo_folds(mesh, blocks, work.before, work.is_parallel)
     if work.varies:

@@ -13,10 +13,11 @@ import sys
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..core import arguments
 from ..core.check import as_array, as_mesh
+from ..core.vocabulary import FloatArray, IntArray
 from ..errors import OptionError, RemeshvecError
 from ..files.plain import check_writable, write_file
 
@@ -29,8 +30,6 @@ __all__ = [
     "three_quarter_view",
 ]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Arrays = tuple[ArrayLike, ArrayLike]  # V (n, 3), F (m, 3)
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
