@@ -9,9 +9,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from test_architecture import FLOOR
 
 import remeshvec
 from remeshvec import evolver, viz
+from remeshvec.sweeps.loop import run_sweeps
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -137,3 +139,22 @@ def test_comparison_is_that_of_the_results():
 
     page = (DOCS / "comparison.md").read_text("utf-8")
     assert page == comparison_page(read_results(DOCS)), "python -m benchmarks --pages writes it"
+
+
+def test_architecture_page_quotes_the_loop():
+    page = (DOCS / "architecture.md").read_text("utf-8")
+    quoted = re.findall(r"^```py\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    assert len(quoted) == 1
+    assert inspect.getsource(run_sweeps).endswith(quoted[0])
+    assert quoted[0].startswith("    for sweep in schedule:\n")
+
+
+def test_architecture_page_lists_all_folders():
+    page = (DOCS / "architecture.md").read_text("utf-8")
+    rows = re.findall(r"^\| (\d+) \| (.*?) \|", page, re.MULTILINE)
+    listed = {
+        room.strip("/").removesuffix(".py"): int(floor)
+        for floor, rooms in rows
+        for room in re.findall(r"`([\w/.]+)`", rooms)
+    }
+    assert listed == {room: floor for room, floor in FLOOR.items() if room != "__main__"}
