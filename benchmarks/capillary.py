@@ -64,7 +64,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             text_columns=2,
         ),
         "## Time to an energy",
-        "Seconds until the energy of the full volume falls below what is said, medians of "
+        "Seconds until the energy of the full volume falls below the given value, medians of "
         f"{REPEATS}, interleaved, one process each for Evolver. Native: `evolve`; Evolver with our "
         "remesher: the same loop with `EvolverBackend`; refined: without remeshing, the triangles of the "
         "start cut into 16 (Evolver: into 4, 16, 64 on the way); Evolver alone: its best script of those "

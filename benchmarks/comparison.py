@@ -30,20 +30,21 @@ BEST_IS_LOW = {"area_error_voronoi", "area_error_face", "hausdorff", "rms"}
 PART = "bracket"  # the mesh with creases
 
 INTRO = (
-    "What other libraries do with the same meshes and the same length, from the run that "
-    "[speed, measured](benchmarks.md) shows mesh by mesh, with the settings of each and how to repeat "
-    "it. Nothing here is measured apart."
+    "This page compares other libraries on the same meshes with the same length. All numbers come from "
+    "the run that [speed, measured](benchmarks.md) shows mesh by mesh, with the settings of each library "
+    "and how to repeat it."
 )
 HINTS = (
-    "The default preset is compared with libraries that project onto the input, the fast one, without "
-    "projection, with those that do not.",
-    "Nobody leads in all columns. Smaller distances come with triangles that stay as uneven as the "
-    "input's, more even areas on the part with worse valences.",
-    "On the two smallest meshes, of some hundred faces, some are faster than ours: there the calls "
-    "themselves cost what the work does.",
-    "The first call on a machine compiles for a while ([start](start.md)); the others come compiled.",
-    "Not compared here: boundaries, labels, seams, provenance. [Parameters](parameters.md) shows what "
-    "ours does with them.",
+    "The default preset is compared with libraries that project onto the input, the fast preset without "
+    "projection with those that do not.",
+    "No library leads in all columns. Smaller distances come with triangles that stay as uneven as those "
+    "of the input, and more even areas on the part come with worse valences.",
+    "On the two smallest meshes, of a few hundred faces, some libraries are faster: there the calls "
+    "themselves cost as much as the work.",
+    "The first call of remeshvec on a machine compiles for a while ([start](start.md)); the other "
+    "libraries come compiled.",
+    "Boundaries, labels, seams and provenance are not compared here. [Parameters](parameters.md) shows "
+    "them for remeshvec.",
 )
 
 
@@ -58,14 +59,14 @@ def comparison_page(results: Results) -> str:
         "Comparison with other libraries",
         INTRO,
         "## Time",
-        f"How many times as long they take as ours with the same work, on {_listed(entries)}; one "
-        "core. Below 1 they are faster.",
+        "Times of other libraries over that of the remeshvec preset that does the same work, on "
+        f"{_listed(entries)}; one core. Below 1 the other library is faster.",
         _times(entries),
         "## Quality",
         f"Medians over {_listed(smooth)}. {LEGEND} The best of each column in bold.",
         _qualities(smooth),
         *(_part(entry) for entry in parts),
-        "## What to take from it",
+        "## Remarks",
         "\n".join(f"- {hint}" for hint in HINTS),
         "## Measured on",
         measured_lines(entries),
@@ -93,7 +94,7 @@ def _times(entries: list[Entry]) -> str:
                 f"{found[high]:.1f} ({high})",
             ]
         )
-    head = ["", "beside", "projects", "median", "least", "most"]
+    head = ["", "compared with", "projects", "median", "least", "most"]
     return table(head, rows, text_columns=3)
 
 
@@ -116,9 +117,10 @@ def _part(entry: Entry) -> str:
     names = [*OURS, *(theirs for theirs, _ in PAIRS)]
     measures = {n: entry["contenders"][n]["quality"] for n in names if _succeeded(entry, n)}
     return (
-        f"## A part with creases\n\nThe same for {entry['mesh']}, {entry['faces']} faces. Distances "
-        "tell who keeps the creases without being asked. PyMeshLab does with its defaults; lean, and "
-        "mmgpy, were told not to look for any.\n\n" + _with_best(measures)
+        f"## A part with creases\n\nThe same measures for {entry['mesh']}, {entry['faces']} faces. "
+        "Distances show which libraries keep the creases without being asked. PyMeshLab does with its "
+        "defaults; PyMeshLab, lean, and mmgpy were told not to look for creases.\n\n"
+        + _with_best(measures)
     )
 
 

@@ -155,7 +155,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     text = page(
         "Control, measured",
         machine_line(machine()),
-        f"Default preset, L = 0.9 x the mean edge. What `feature_angle=\"auto\"` changes against "
+        f"Default preset, L = 0.9 x the mean edge. Effect of `feature_angle=\"auto\"` against "
         f"`None`: percentage points, mean and standard deviation over {options.rotations} "
         "orientations. The rule's constants were chosen on a corpus that holds the samples. Last "
         "columns, one thread: time with features and projection over that without features, and over "
@@ -169,14 +169,14 @@ def main(argv: Sequence[str] | None = None) -> None:
         ),
         f"`Adaptive(tolerance)` on a unit sphere of 81,920 faces, {options.rotations} orientations, "
         "mean (worst): faces over the optimum, the number of equilateral ones whose middles are off by "
-        "the tolerance; largest distance from the sphere of 91 samples a face, in tolerances; least "
+        "the tolerance; largest distance from the sphere of 91 samples per face, in tolerances; least "
         "share of samples within it; largest ratio of target lengths along an edge (1.5 is allowed).",
         table(
             ("tolerance", "faces / optimum", "error / tolerance", "within %", "gradation"),
             sphere_rows(options.rotations),
         ),
         "`max_deviation` at twice that L, in % of the diagonal; distances from 200,000 samples each way, "
-        "in units of what was allowed.",
+        "in units of the bound.",
         table(
             (
                 "mesh", "allowed %", "without bound %", "input to result", "result to input",

@@ -251,7 +251,7 @@ def _page(
                 "vertices",
                 "E Voronoi %",
                 "factor ms",
-                "a vertex ms",
+                "ms per vertex",
                 "total s",
                 "the report's total s",
             ],
@@ -260,8 +260,8 @@ def _page(
         ),
         "![Seconds for all right-hand sides](plots/laplacians.png)",
         "## Solvers",
-        f"Three right-hand sides, interleaved, medians of {REPEATS}. `LaplacianSolver` checks and slices "
-        "the matrix besides, and solves once to see that the factor is good. The original is "
+        f"Three right-hand sides, interleaved, medians of {REPEATS}. `LaplacianSolver` also checks and "
+        "slices the matrix, and solves once to verify the factor. The original is "
         f"{made(9)} of [the benchmarks](benchmarks.md).",
         table(
             ["", "faces", "factor s", "solve ms"],
@@ -270,7 +270,7 @@ def _page(
                 for name, faces, factor, solve in solvers
             ],
         ),
-        "## What uniform areas cost",
+        "## The error of uniform areas",
         f"Largest relative error of the first {N_EIGENVALUES} to {N_EIGENVALUES + 4} eigenvalues that "
         "are not 0: of the sphere against l (l + 1), of other meshes, where nothing exact is known, "
         "between uniform and Voronoi areas.",

@@ -43,9 +43,9 @@ RATIOS = (
     ("pyacvd / default", who.ACVD, who.DEFAULT),
 )
 INTRO = (
-    "L = 0.9 x the mean edge length of the input unless said, the same for all. Contenders run warm, "
-    "in turns (A B C A B C ...), each in a process of its own; one core means bound to one core. "
-    "Arrays in, arrays out. Medians of five turns, unless a number of turns is given. "
+    "L = 0.9 x the mean edge length of the input unless stated otherwise, the same for all. "
+    "Contenders run warm, in turns (A B C A B C ...), each in a process of its own; one core "
+    "means bound to one core. Arrays in, arrays out. Medians of five turns, unless a number of turns is given. "
     "`-x16`: the input cut into 16 times the faces, vertices moved at random within their faces; "
     "`@0.5`: L = 0.5 x the mean edge."
 )
@@ -58,17 +58,17 @@ export REMESHVEC_PMP=~/pmp/remesh    # optional, too
 python -m benchmarks                 # all parts, the most important first
 python -m benchmarks targets         # those that the table of targets needs
 python -m benchmarks large threads   # some; --help lists them and what they take
-python -m benchmarks --missing       # go on with a run that was stopped
+python -m benchmarks --missing       # continue a run that was stopped
 python -m benchmarks --quick         # does everything run? Small meshes, into build/benchmarks
 python -m benchmarks --merge FILE    # take over the benchmarks.json of another machine
 pytest benchmarks                    # phases, calls and starts one at a time; -m slow from 1M faces
 ```
 
 All results are in `benchmarks.json`, each with its date and machine, and are written after every mesh.
-What fails, crashes or takes too long costs its own row only.
+A contender that fails, crashes or takes too long loses only its own row.
 
 The executable for the PMP library gets `INPUT OUTPUT LENGTH ITERATIONS PROJECT` (OFF files, PROJECT 0
-or 1) and prints the seconds of the remeshing alone. Built with `-O3 -march=native`, its heart is:
+or 1) and prints the seconds of the remeshing alone. Built with `-O3 -march=native`, it runs in essence:
 
 ```cpp
 pmp::SurfaceMesh mesh;
@@ -112,13 +112,13 @@ def _benchmarks(results: Results, pictures: set[str]) -> str:
         _times(races["sizes"]),
         _memory(results.get("memory", {})),
         "## Ratios of times",
-        "Of medians; in parentheses of processor time, which a busy machine disturbs less.",
+        "Ratios of medians; in parentheses those of processor time, which a busy machine disturbs less.",
         _ratio_table([*compared, *races["large"].values()]),
         "## Phases",
         _picture(pictures, "phases", "Time by phase"),
         "## Time beside quality",
         LEGEND + " x default: time over that of remeshvec default. Memory: peak of the process, in "
-        "parentheses what came on top of its libraries and the mesh.",
+        "parentheses the part above its libraries and the mesh.",
         *(_mesh(entry) for entry in (*compared, *races["large"].values())),
         "## Settings",
         _settings(),

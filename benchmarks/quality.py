@@ -102,9 +102,9 @@ def as_page(entries: list[Entry]) -> str:
         machine_line(machine()),
         _targets_part(aimed, missed, titles),
         "## All presets",
-        "Topology: components, boundary loops, Euler number; nothing non-manifold, misoriented, "
-        "degenerate or unreferenced that was not. Turned: faces that point against all the input "
-        "faces on which their corners lie.",
+        "Topology: components, boundary loops, Euler number; no non-manifold, misoriented, "
+        "degenerate or unreferenced elements that the input did not have. Turned: faces that point "
+        "against all the input faces on which their corners lie.",
         table(
             ["mesh", "preset", "topology", *titles, "turned"],
             [[e.mesh, e.recipe, e.topology, *cells(e.measures), str(e.turned)] for e in entries],

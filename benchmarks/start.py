@@ -137,5 +137,9 @@ def _said(entries: Sequence[Entry]) -> str:
     lines = sorted({line for entry in entries for c in entry["cold"] for line in c["notices"]})
     quiet = not any(child["notices"] for entry in entries for child in entry["warm"])
     said = "\n".join(f"    {line}" for line in lines) or "    (nothing)"
-    after = "Nothing is said once compiled." if quiet else "Warm processes say something too."
+    after = (
+        "Once everything is compiled, there is no message."
+        if quiet
+        else "Warm processes print a message too."
+    )
     return f"While compiling, the error stream says:\n\n{said}\n\n{after}"

@@ -1,6 +1,6 @@
 """Contenders in processes of their own, one mesh each.
 
-So a peer that hangs or crashes costs its own row only, the peak memory of a process is that of one
+So a peer that hangs or crashes loses only its own row, the peak memory of a process is that of one
 contender on one mesh, and "one core" means one core: the process is bound to it from its start,
 whatever thread pools the libraries inside have (trueform's pool works even with
 ``parallel=False``).
