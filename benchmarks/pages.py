@@ -45,8 +45,8 @@ RATIOS = (
 INTRO = (
     "L = 0.9 x the mean edge length of the input unless stated otherwise, the same for all. "
     "Contenders run warm, in turns (A B C A B C ...), each in a process of its own; one core "
-    "means bound to one core. Arrays in, arrays out. Medians of five turns, unless a number of turns is given. "
-    "`-x16`: the input cut into 16 times the faces, vertices moved at random within their faces; "
+    "means bound to one core. Arrays in, arrays out. Medians of five turns, unless a number of turns is "
+    "given. `-x16`: the input cut into 16 times the faces, vertices moved at random within their faces; "
     "`@0.5`: L = 0.5 x the mean edge."
 )
 
