@@ -223,7 +223,9 @@ def _add_files_of_constraints(group: argparse._ArgumentGroup) -> None:
         "--selection", metavar="FILE", help="faces to remesh; all others stay and come first"
     )
     group.add_argument(
-        "--face-labels", metavar="FILE", help="a whole number a face, whose borders are kept"
+        "--face-labels",
+        metavar="FILE",
+        help="a whole number per face; borders between different numbers are kept",
     )
 
 
