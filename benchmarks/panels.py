@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from remeshvec import viz
 from remeshvec.files.plain import write_file
 from remeshvec.interop.mesh_data import split_vertices
+from remeshvec.viz import pictures, require_viewer
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -78,7 +78,9 @@ def draw(path: Path, picture: Picture, largest: int = LARGEST) -> None:
     frame = _frame(picture)
     width, height = frame.pixels
     rows = -(-len(picture.panels) // picture.columns)
-    page = Image.new("RGB", (picture.columns * width, rows * (height + CAPTION)), viz.BACKGROUND)
+    page = Image.new(
+        "RGB", (picture.columns * width, rows * (height + CAPTION)), pictures.BACKGROUND
+    )
     pen = ImageDraw.Draw(page)
     font = ImageFont.load_default(size=TEXT_SIZE)
     for k, panel in enumerate(picture.panels):
@@ -86,7 +88,7 @@ def draw(path: Path, picture: Picture, largest: int = LARGEST) -> None:
         page.paste(Image.fromarray(_render(panel, frame)).resize(frame.pixels), (x, y + CAPTION))
         text = f"{panel.caption}\n{_second_line(panel)}"
         place = (x + width / 2, y + CAPTION / 2)
-        pen.multiline_text(place, text, viz.TEXT, font, "mm", align="center")
+        pen.multiline_text(place, text, pictures.TEXT, font, "mm", align="center")
     content = io.BytesIO()
     page.quantize(COLOURS, dither=Image.Dither.NONE).save(content, "PNG", optimize=True)
     if content.tell() > largest:
@@ -170,7 +172,7 @@ def _frame(picture: Picture) -> Frame:
 
 
 def _render(panel: Panel, frame: Frame) -> NDArray[np.uint8]:
-    pyvista = viz.require_viewer()
+    pyvista = require_viewer()
     middle, half_width = frame.middle, frame.half_width
     if panel.close_up is not None:
         middle, half_width = panel.close_up[0], half_width / panel.close_up[1]
@@ -179,7 +181,7 @@ def _render(panel: Panel, frame: Frame) -> NDArray[np.uint8]:
     with pyvista.vtk_verbosity("off"):  # VTK would warn that there is no X server
         plotter = pyvista.Plotter(off_screen=True, window_size=size)
         try:
-            plotter.set_background(viz.BACKGROUND)
+            plotter.set_background(pictures.BACKGROUND)
             _add(plotter, pyvista, panel, points, size[0])
             plotter.camera.parallel_projection = True
             plotter.camera.parallel_scale = size[1] / size[0]
@@ -196,7 +198,7 @@ def _add(plotter: Any, pyvista: Any, panel: Panel, points: FloatArray, width: in
     edges = points[panel.F] - points[np.roll(panel.F, 1, axis=1)]
     pixels = float(np.median(np.linalg.norm(edges, axis=2))) * width / 2 / OVERSAMPLING
     surface = pyvista.PolyData.from_regular_faces(points, panel.F)
-    colours: dict[str, Any] = {"color": viz.FRONT, "backface_params": {"color": viz.BACK}}
+    colours: dict[str, Any] = {"color": pictures.FRONT, "backface_params": {"color": pictures.BACK}}
     if panel.colours is not None:
         colours = {"scalars": panel.colours, "rgb": True}
     if panel.texture is not None:
@@ -212,15 +214,15 @@ def _add(plotter: Any, pyvista: Any, panel: Panel, points: FloatArray, width: in
         diffuse=0.75,
         specular=0.0,
         show_edges=True,
-        edge_color=viz.EDGE,
+        edge_color=pictures.EDGE,
         line_width=OVERSAMPLING * float(np.clip(pixels / 18, 0.5, 1.0)),
-        edge_opacity=float(np.clip(pixels / viz.CLEAR_EDGE, 0.3, 0.9)),
+        edge_opacity=float(np.clip(pixels / pictures.CLEAR_EDGE, 0.3, 0.9)),
     )
     nearer = points + LIFT
     if panel.lines is not None and len(panel.lines):
         pairs = np.insert(panel.lines, 0, 2, axis=1).ravel()
         lines = pyvista.PolyData(nearer, lines=pairs)
-        plotter.add_mesh(lines, color=viz.EDGE, line_width=OVERSAMPLING * LINE, lighting=False)
+        plotter.add_mesh(lines, color=pictures.EDGE, line_width=OVERSAMPLING * LINE, lighting=False)
     if panel.dots is not None and len(panel.dots):
         dots = pyvista.PolyData(nearer[panel.dots] + LIFT)
         size = OVERSAMPLING * DOT

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 from collections.abc import Iterable, Iterator, Sized
 from dataclasses import dataclass, field, replace
@@ -12,7 +11,7 @@ from ..core import arguments
 from ..core.threads import available_threads
 from ..errors import BatchError, OptionError
 from ..files.plain import MeshFile, read_mesh
-from ..input.options import RemeshKeywords
+from ..input.options import OPTION_NAMES, RemeshKeywords
 from ..output.result import RemeshResult
 from ..pipeline.job import Lengths
 from ..pipeline.remesh import remesh
@@ -153,8 +152,7 @@ def _iterator(items: Any) -> Iterator[Any]:
 
 def _check_names(options: Iterable[str]) -> None:
     """Refuse options that do not exist, which would fail for every item."""
-    known = inspect.signature(remesh).parameters.keys() - {"V", "F", "L", "return_result"}
-    unknown = sorted(set(options) - known)
+    unknown = sorted(set(options) - set(OPTION_NAMES))
     if unknown:
         raise OptionError(f"there is no option {', '.join(unknown)}")
 

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import Any
+from typing import Any, get_args
 
 from ..core.version import __version__
 from ..core.vocabulary import DEFAULT_LENGTH_FACTOR
 from ..errors import OptionError
 from ..files.plain import MeshFile
 from ..files.with_data import COMMON_SUFFIXES
+from ..input.options import OPTION_NAMES, Boundary, Preset
 from ..measures.quality import quality
 from ..sizing.adaptive import Adaptive
 
-__all__ = ["batch_parser", "given_options", "parser", "target_length"]
+__all__ = ["FILE_OPTIONS", "batch_parser", "given_options", "parser", "target_length"]
 
 
 EPILOG = """\
@@ -43,21 +44,14 @@ input or with other options.
 exit status: 0 all meshes are done, 3 some failed, 2 bad arguments, 130 interrupted
 """
 
-# Arguments that the library knows under the same name.
-_SAME = (
-    "iterations",
-    "tol",
-    "split",
-    "collapse",
-    "foldover",
-    "sliver_check",
-    "fit",
-    "threads",
-    "gradation",
-    "n_faces",
-    "n_vertices",
-    "max_deviation",
-)
+# Options of `remesh` whose flags name files of numbers, and how many columns these have.
+FILE_OPTIONS = {
+    "feature_edges": 2,
+    "fixed_vertices": 1,
+    "fixed_faces": 1,
+    "selection": 1,
+    "face_labels": 1,
+}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -143,15 +137,17 @@ def target_length(options: argparse.Namespace, mesh: MeshFile) -> Any:
 
 
 def given_options(options: argparse.Namespace) -> dict[str, Any]:
-    """Return those options that were given, so that the presets decide on the others."""
-    given = {name: getattr(options, name) for name in _SAME}
-    given["project"] = False if options.no_project else None
-    chosen = {
-        "preset": options.preset,
-        "feature_angle": options.feature_angle,
-        "boundary": options.boundary,
+    """Return the options of `remesh` that were given, so that the presets decide on the others."""
+    given = {
+        name: getattr(options, name)
+        for name in OPTION_NAMES
+        if name not in FILE_OPTIONS and getattr(options, name, None) is not None
     }
-    return chosen | {k: v for k, v in given.items() if v is not None}
+    if options.feature_angle is None:  # "none", which is not the default
+        given["feature_angle"] = None
+    if options.no_project:
+        given["project"] = False
+    return given
 
 
 def _add_size_options(
@@ -208,7 +204,7 @@ def _add_constraints(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--boundary",
-        choices=("free", "split", "fixed"),
+        choices=get_args(Boundary),
         default="free",
         help="boundary vertices slide along it (free), stay and get new ones between (split), or "
         "stay as they are (fixed)",
@@ -232,7 +228,7 @@ def _add_files_of_constraints(group: argparse._ArgumentGroup) -> None:
 def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--preset",
-        choices=("default", "fast", "fine"),
+        choices=get_args(Preset),
         default="default",
         help="fast: the published algorithm; fine: more sweeps and a closer fit",
     )

@@ -23,7 +23,7 @@ from ..files.with_data import check_data_writable, read_data, write_data
 from ..interop.mesh_data import carry
 from ..measures.quality import side_by_side
 from ..output.result import RemeshResult
-from .arguments import given_options, parser, target_length
+from .arguments import FILE_OPTIONS, given_options, parser, target_length
 from .array_files import read_array, write_arrays
 
 __all__ = ["main"]
@@ -153,20 +153,10 @@ def _length(options: argparse.Namespace, mesh: MeshFile) -> Any:
     return length if options.lengths is None else read_array(options.lengths, whole=False)
 
 
-# Arguments that name files of indices, with the numbers in a row.
-_ARRAYS = {
-    "feature_edges": 2,
-    "fixed_vertices": 1,
-    "fixed_faces": 1,
-    "selection": 1,
-    "face_labels": 1,
-}
-
-
 def _library_options(options: argparse.Namespace) -> dict[str, Any]:
     """Return those options that were given, with the arrays that they name."""
     given = given_options(options)
-    for name, columns in _ARRAYS.items():
+    for name, columns in FILE_OPTIONS.items():
         path = getattr(options, name)
         if path is not None:
             given[name] = read_array(path, columns)

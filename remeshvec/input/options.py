@@ -12,6 +12,10 @@ from numpy.typing import ArrayLike
 
 __all__ = [
     "MAX_FACES",
+    "OPTION_NAMES",
+    "Boundary",
+    "Callback",
+    "Preset",
     "RemeshKeywords",
     "RemeshOptions",
     "read_options",
@@ -101,7 +105,7 @@ class RemeshKeywords(TypedDict, total=False):
     callback: Callback | None
 
 
-_NAMES = tuple(field.name for field in fields(RemeshOptions))
+OPTION_NAMES = tuple(field.name for field in fields(RemeshOptions))
 
 
 def read_options(caller: str, given: dict[str, Any]) -> RemeshOptions:
@@ -113,8 +117,8 @@ def read_options(caller: str, given: dict[str, Any]) -> RemeshOptions:
         A keyword that does not exist, as Python itself raises it.
     """
     for name in given:
-        if name not in _NAMES:
-            near = difflib.get_close_matches(name, _NAMES, 1)
+        if name not in OPTION_NAMES:
+            near = difflib.get_close_matches(name, OPTION_NAMES, 1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             raise TypeError(f"{caller}() got an unexpected keyword argument {name!r}{hint}")
     return RemeshOptions(**given)
