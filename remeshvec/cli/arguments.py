@@ -197,7 +197,7 @@ def _add_size_options(
 def _add_constraints(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--feature-angle",
-        type=_feature_angle,
+        type=_angle_or_word,
         default="auto",
         metavar="DEG",
         help="keep edges that turn by more; auto: those that stand out (default), none: no edges",
@@ -324,7 +324,7 @@ def _at_least_one(text: str) -> int:
     return value
 
 
-def _feature_angle(text: str) -> float | str | None:
+def _angle_or_word(text: str) -> float | str | None:
     if text in ("auto", "none"):
         return None if text == "none" else text
     return _positive_number(text)

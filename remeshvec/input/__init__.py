@@ -1,1 +1,1 @@
-"""The caller's arrays, options and wishes, checked and turned into arrays on a clean mesh."""
+"""The caller's arrays and options, checked, as arrays on a clean mesh."""

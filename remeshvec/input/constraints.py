@@ -1,9 +1,9 @@
-"""What the caller wants kept: checked, and then turned from input indices to arrays on the mesh."""
+"""What the caller wants kept: checked, then turned from indices of the input to masks on the mesh."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,9 @@ from ..core.vocabulary import EQUAL_DATA, NONE, BoolArray, IndexArray, Mesh
 from ..errors import OptionError
 from ..mesh.edges import edge_keys
 from ..mesh.walk import ends_of
-from .options import RemeshOptions
+from .options import Boundary, RemeshOptions
 
-__all__ = ["BOUNDARY_MODES", "ConstraintMasks", "Constraints", "make_constraints"]
-
-BOUNDARY_MODES = ("free", "split", "fixed")
+__all__ = ["ConstraintMasks", "Constraints", "make_constraints"]
 
 
 class ConstraintMasks(NamedTuple):
@@ -41,7 +39,7 @@ class Constraints:
     fixed_faces: BoolArray | None  # (m,)
     labels: NDArray[Any] | None  # (m,)
     on_corners: list[NDArray[Any]]  # (m, 3, k) each, or (m, 1, k): whose jumps are kept
-    unselected: BoolArray | None  # (m,) those of the fixed faces that are to come first, in order
+    unselected: BoolArray | None  # (m,) fixed faces that come first in the result, in their order
     F: NDArray[np.int64]  # (m, 3)
 
     def on_mesh(
@@ -51,7 +49,7 @@ class Constraints:
         face_source: NDArray[np.intp],
         representative: Any,
     ) -> ConstraintMasks:
-        """Turn the wishes to masks of a mesh whose elements come from the input's.
+        """Turn the constraints into masks on a mesh made from the input's elements.
 
         Parameters
         ----------
@@ -165,7 +163,7 @@ def make_constraints(n: int, F: NDArray[np.int64], options: RemeshOptions) -> Co
     fixed, unselected = _kept_faces(options, len(F))
     return Constraints(
         _feature_angle(options.feature_angle),
-        choice(options.boundary, "boundary", BOUNDARY_MODES),
+        choice(options.boundary, "boundary", get_args(Boundary)),
         _feature_edges(options.feature_edges, n, F),
         _fixed_vertices(options.fixed_vertices, n),
         fixed,

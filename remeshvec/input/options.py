@@ -28,7 +28,9 @@ Preset = Literal["default", "fast", "fine"]
 Boundary = Literal["free", "split", "fixed"]
 FeatureAngle = float | Literal["auto"] | None  # degrees
 Factors = float | Sequence[float]  # of the target length, for all sweeps or stretched over them
-Faces = ArrayLike | str  # indices or a mask; the name of such data where a mesh object carries them
+FaceChoice = (
+    ArrayLike | str
+)  # indices or a mask; the name of such data where a mesh object carries them
 Labels = ArrayLike | str  # one whole number per face; or a name, likewise
 Corners = (
     ArrayLike | Sequence[ArrayLike | str] | str
@@ -53,10 +55,10 @@ class RemeshOptions:
     feature_angle: FeatureAngle = "auto"
     feature_edges: ArrayLike | None = None
     fixed_vertices: ArrayLike | None = None
-    fixed_faces: Faces | None = None
+    fixed_faces: FaceChoice | None = None
     face_labels: Labels | None = None
     preserve: Corners | None = None
-    selection: Faces | None = None
+    selection: FaceChoice | None = None
     boundary: Boundary = "free"
     # How to remesh.
     preset: Preset = "default"
@@ -85,10 +87,10 @@ class RemeshKeywords(TypedDict, total=False):
     feature_angle: FeatureAngle
     feature_edges: ArrayLike | None
     fixed_vertices: ArrayLike | None
-    fixed_faces: Faces | None
+    fixed_faces: FaceChoice | None
     face_labels: Labels | None
     preserve: Corners | None
-    selection: Faces | None
+    selection: FaceChoice | None
     boundary: Boundary
     preset: Preset
     iterations: int | None

@@ -1,1 +1,1 @@
-"""One call, start to end; the only place that knows all stages."""
+"""One call, from start to end: the only place that knows all stages."""

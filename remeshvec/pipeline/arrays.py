@@ -24,7 +24,7 @@ from ..output.extract import Output, extract, locate
 from ..output.report import Report
 from ..output.result import RemeshResult
 from ..sizing.target_lengths import check_gradation
-from ..sweeps.progress import Progress
+from ..sweeps.monitor import Monitor
 from ..sweeps.work import is_large
 from .job import Job, Remeshed, Sizing, meet_count
 
@@ -45,8 +45,8 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
     with compile_notice(), thread_scope(recipe.threads) as may_run_parallel:
         with watch.time("build"):
             prepared = prepare(vertices, faces, may_run_parallel and is_large(len(faces)))
-        progress = Progress(watch, options.callback)
-        job = Job(prepared, constraints, vertices, sizing, recipe, progress, may_run_parallel)
+        monitor = Monitor(watch, options.callback)
+        job = Job(prepared, constraints, vertices, sizing, recipe, monitor, may_run_parallel)
         del prepared  # it holds the mesh of the input
         done = job.run_once() if wanted is None else meet_count(job, *wanted)
         out = _extract(job, done, constraints, len(faces), np.asarray(F).dtype)
@@ -63,7 +63,7 @@ def _extract(
     job: Job, done: Remeshed, constraints: Constraints, n_faces: int, dtype: np.dtype[Any]
 ) -> Output:
     """Turn the last mesh into the arrays of a result."""
-    recipe, watch = job.recipe, job.progress.watch
+    recipe, watch = job.recipe, job.monitor.watch
     parallel = job.may_run_parallel and is_large(len(done.mesh.origin) // 3)
     barycentric = None
     if _ends_on_input(recipe):

@@ -21,8 +21,8 @@ from ..sweeps.deviation import DeviationGuard
 from ..sweeps.finish import finish, has_finish, measure_deviation
 from ..sweeps.guard import Guard
 from ..sweeps.loop import Stop, run_sweeps
+from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Adaptation, Plan, make_schedule
-from ..sweeps.progress import Progress
 from ..sweeps.work import Work, is_large
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
@@ -75,7 +75,7 @@ class Job:
         V: FloatArray,
         sizing: Sizing,
         recipe: Recipe,
-        progress: Progress,
+        monitor: Monitor,
         may_run_parallel: bool,
     ) -> None:
         self.prepared = prepared
@@ -83,10 +83,10 @@ class Job:
         self.V = V
         self.sizing = sizing
         self.recipe = recipe
-        self.progress = progress
+        self.monitor = monitor
         self.may_run_parallel = may_run_parallel
         self.parallel = may_run_parallel and is_large(len(prepared.mesh.origin) // 3)
-        with progress.watch.time("reference"):
+        with monitor.watch.time("reference"):
             self.size = mesh_size(prepared, self.parallel)
         self.plan = Plan(recipe, prepared.scale, sizing.gradation, _adaptation(prepared, sizing))
 
@@ -105,11 +105,11 @@ class Job:
 
     def _sweep(self, meshes: list[Mesh], L: Lengths | None) -> Remeshed:
         """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
-        progress = self.progress
-        with progress.watch.time("reference"):
+        monitor = self.monitor
+        with monitor.watch.time("reference"):
             featured, length = self._build_reference(meshes[0], L)
-        progress.counts = []
-        work = Work(meshes.pop(), featured, self.plan, progress, self.may_run_parallel)
+        monitor.counts = []
+        work = Work(meshes.pop(), featured, self.plan, monitor, self.may_run_parallel)
         guard = Guard()
         if self.plan.max_deviation is not None:
             guard = DeviationGuard(featured, self.plan.max_deviation, work.is_parallel)
@@ -122,7 +122,7 @@ class Job:
             is_compact,
             featured,
             length / self.prepared.scale,
-            progress.counts,
+            monitor.counts,
             _in_words(stop, self.recipe.tol),
             measure_deviation(work, guard),
         )
@@ -182,7 +182,7 @@ def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
         if best is None or abs(count - wanted) < abs(best.count(noun) - wanted):
             best = done
         held = done.count_held() // (1 if noun == "faces" else 2)
-        if abs(count - wanted) <= _CLOSE_ENOUGH * wanted or job.progress.is_cancelled:
+        if abs(count - wanted) <= _CLOSE_ENOUGH * wanted or job.monitor.is_cancelled:
             break
         L *= min(2.0, max(0.5, sqrt(max(count - held, 1) / max(wanted - held, 1))))
     assert best is not None

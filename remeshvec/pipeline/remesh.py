@@ -18,6 +18,7 @@ from .objects import are_arrays, is_pair, only_length, remesh_object
 __all__ = ["remesh"]
 
 M = TypeVar("M")
+MeshObject = Any  # of another library
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -51,13 +52,13 @@ def remesh(
 
 @with_options
 def remesh(
-    V: Any,
-    F: Any = None,
-    L: Any = None,
+    V: ArrayLike | MeshObject,
+    F: ArrayLike | Lengths | None = None,
+    L: Lengths | str | None = None,
     *,
     return_result: bool = False,
     **options: Any,
-) -> Any:
+) -> RemeshResult | MeshObject:
     """Remesh a surface to well-shaped triangles with edges of length ``L``.
 
     Every sweep splits long edges, collapses short ones, flips edges towards valence 6 and relaxes
@@ -75,11 +76,11 @@ def remesh(
         Vertices; any array-like, never modified. Or a whole mesh, with ``L`` after it: a pair ``(V, F)``,
         a ``trimesh.Trimesh``, ``pyvista.PolyData``, ``meshio.Mesh`` or ``open3d.geometry.TriangleMesh``.
         Objects come back as objects of the same type, with colours, texture coordinates, fields and
-        groups; seams of textures and borders of groups are kept. Tensors of PyTorch come back as such.
+        groups; seams of textures and borders of groups are kept. Tensors of PyTorch come back as tensors.
     F : (m, 3) int
-        Triangles as 0-based indices; any array-like, never modified. Boundaries, several components
-        and any genus are welcome, edges of three faces and more too: sheets share their vertices on
-        such edges before and after. Degenerate, duplicate and unreferenced elements, inconsistent
+        Triangles as 0-based indices; any array-like, never modified. Boundaries, several components,
+        any genus, and edges with three or more faces are welcome: sheets share their vertices on such
+        edges before and after. Degenerate, duplicate and unreferenced elements, inconsistent
         winding and pinched vertices are handled and listed in ``report.dirt``.
     L : float, (n,) array, callable or Adaptive, optional
         Target edge length in the units of ``V``: for all edges, at each input vertex, as a function of
@@ -169,11 +170,12 @@ def remesh(
     """
     wanted = read_options("remesh", options)
     with_result = flag(return_result, "return_result")
-    if is_pair(V):
-        (V, F), L = V, only_length(F, L)
+    mesh: Any = V
+    if is_pair(mesh):
+        (V, F), L = mesh, only_length(F, L)
     elif not are_arrays(V, F):
-        mesh, result = remesh_object(V, only_length(F, L), wanted)
-        return (mesh, result) if with_result else mesh
+        new, result = remesh_object(mesh, only_length(F, L), wanted)
+        return (new, result) if with_result else new
     if with_result:
         raise OptionError("return_result goes with mesh objects; arrays give the result anyway")
     given = V, F

@@ -1,1 +1,1 @@
-"""The loop over the operations, and what comes after the last one."""
+"""The loop over the operations, and the finish after the last sweep."""

@@ -21,7 +21,7 @@ def correct_lengths(work: Work) -> None:
         return
     work.compact()
     mesh, featured = work.mesh, work.featured
-    with work.progress.watch.time("deviation"):
+    with work.monitor.watch.time("deviation"):
         lengths = shortened_lengths(mesh, featured, adaptation.tolerance, work.is_parallel)
         X = featured.reference.X
         old = X[:, 3].copy()

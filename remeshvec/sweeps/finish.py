@@ -50,7 +50,7 @@ def has_finish(work: Work) -> bool:
 
 def finish(work: Work, guard: Guard) -> None:
     """Bring a swept mesh into its last shape; it is compact afterwards."""
-    watch = work.progress.watch
+    watch = work.monitor.watch
     with watch.time("extract"):
         work.compact()
         _let_go(work)
@@ -134,5 +134,5 @@ def measure_deviation(work: Work, guard: Guard) -> dict[str, float]:
         if plan.adaptation is None:
             return {}
         guard = DeviationGuard(work.featured, plan.adaptation.tolerance, work.is_parallel)
-    with work.progress.watch.time("deviation"):
+    with work.monitor.watch.time("deviation"):
         return {way: d / plan.scale for way, d in guard.measure(work.mesh).items()}

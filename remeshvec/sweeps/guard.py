@@ -48,24 +48,24 @@ class HoldingGuard(Guard):
 
     def attempts(self, work: Work) -> Iterator[Work]:
         """Yield copies of the work; the first good one becomes the work, which else stays as it is."""
-        progress = work.progress
+        monitor = work.monitor
         work.compact()
-        with progress.watch.time("deviation"):
+        with monitor.watch.time("deviation"):
             self.remember(work.mesh)
-        counts = dict(progress.counts[-1])
+        counts = dict(monitor.counts[-1])
         for attempt in range(_ATTEMPTS):
-            progress.counts[-1] = dict(counts)
+            monitor.counts[-1] = dict(counts)
             trial = work.trial()
             yield trial
-            with progress.watch.time("deviation"):
+            with monitor.watch.time("deviation"):
                 offenders = self.offenders(trial.mesh)
                 if not len(offenders):
                     self.release(trial.mesh)
                     work.adopt(trial)
                     return
-                if progress.is_cancelled:
+                if monitor.is_cancelled:
                     break
                 self.hold(work.mesh, offenders, attempt)
         self.release(work.mesh)
         work.step = np.inf
-        progress.counts[-1] = {"collapse": 0, "flip": 0, **counts}
+        monitor.counts[-1] = {"collapse": 0, "flip": 0, **counts}

@@ -29,14 +29,14 @@ def run_sweeps(work: Work, schedule: Sequence[Sweep], guard: Guard) -> Stop:
     and try again with parts of the mesh held.
     """
     for sweep in schedule:
-        work.progress.begin_sweep()
+        work.monitor.begin_sweep()
         split(work, sweep)
         for trial in guard.attempts(work):
             collapse(trial, sweep)
             flip(trial, sweep)
             relax(trial, sweep)
             project(trial, sweep)
-        if work.progress.is_cancelled:
+        if work.monitor.is_cancelled:
             return Stop.CANCELLED
         if has_converged(work):
             return Stop.CONVERGED
@@ -50,4 +50,4 @@ def has_converged(work: Work) -> bool:
     tol = work.plan.recipe.tol
     if tol is None or work.step > tol:
         return False
-    return sum(work.progress.counts[-1].values()) <= tol * work.count_edges()
+    return sum(work.monitor.counts[-1].values()) <= tol * work.count_edges()

@@ -45,12 +45,12 @@ def _phase(*, reports_as: str | None) -> Callable[[Phase], Phase]:
     def decorate(run: Phase) -> Phase:
         @wraps(run)
         def timed(work: Work, sweep: Sweep) -> None:
-            if work.progress.is_cancelled:
+            if work.monitor.is_cancelled:
                 return
-            with work.progress.watch.time(run.__name__):
+            with work.monitor.watch.time(run.__name__):
                 run(work, sweep)
             if reports_as is not None:
-                work.progress.report(reports_as)
+                work.monitor.report(reports_as)
 
         return timed
 
@@ -77,7 +77,7 @@ def split(work: Work, sweep: Sweep) -> None:
         work.put(refined)
     else:
         work.flags = classify_edges(work.mesh, work.blocks, factor, shortest, work.is_parallel)
-    work.progress.counts[-1]["split"] = count
+    work.monitor.counts[-1]["split"] = count
 
 
 def _split_factor(work: Work, sweep: Sweep) -> float:
@@ -86,7 +86,7 @@ def _split_factor(work: Work, sweep: Sweep) -> float:
     Once all that is left is edges that are split and collapsed again and again, because their place has
     room for neither one nor two, edges stay whose halves would soon be collapsed.
     """
-    counts = work.progress.counts[:-1][-_CYCLE:]
+    counts = work.monitor.counts[:-1][-_CYCLE:]
     done = [count["split"] + count["collapse"] for count in counts]
     if len(done) == _CYCLE and min(done) > 0.7 * max(done):
         work.is_calm |= done[-1] < max(_CALM * work.count_edges(), 10.0)
@@ -101,7 +101,7 @@ def collapse(work: Work, sweep: Sweep) -> None:
     count = int(tally[0])
     if work.featured.on_non_manifold is not None:
         count += collapse_siblings(mesh, *find_non_manifold_edges(mesh), sweep.collapse)
-    work.progress.counts[-1]["collapse"] = count
+    work.monitor.counts[-1]["collapse"] = count
     n_gone = 0 if flags is None else flags.n_gone + 2 * count
     if n_gone > _SPARSE * work.n_faces and not work.keeps_numbers:
         work.compact(SPARE)
@@ -111,7 +111,7 @@ def collapse(work: Work, sweep: Sweep) -> None:
 def flip(work: Work, sweep: Sweep) -> None:
     """Flip edges towards valence 6."""
     tally = flip_edges(work.mesh, work.blocks, sweep.flip, work.is_parallel, sweep.flip_passes)
-    work.progress.counts[-1]["flip"] = int(tally[0])
+    work.monitor.counts[-1]["flip"] = int(tally[0])
 
 
 @_phase(reports_as=None)

@@ -9,8 +9,8 @@ from ..mesh.blocks import make_blocks
 from ..operations.classify import EdgeFlags
 from ..operations.split import compact
 from ..reference.build import FeaturedReference
+from .monitor import Monitor
 from .plan import Plan
-from .progress import Progress
 
 __all__ = ["Work", "is_large"]
 
@@ -33,7 +33,7 @@ class Work:
     featured : FeaturedReference
         The input, as the phases look back at it.
     plan : Plan
-    progress : Progress
+    monitor : Monitor
     flags : EdgeFlags or None
         Which edges are long or short, as the splits left them; None where nothing is known.
     step : float
@@ -54,13 +54,13 @@ class Work:
         mesh: Mesh,
         featured: FeaturedReference,
         plan: Plan,
-        progress: Progress,
+        monitor: Monitor,
         may_run_parallel: bool,
     ) -> None:
         self.put(mesh)
         self.featured = featured
         self.plan = plan
-        self.progress = progress
+        self.monitor = monitor
         self.may_run_parallel = may_run_parallel
         self.step = np.inf
         self.before: FloatArray | None = None

@@ -5,10 +5,10 @@ from __future__ import annotations
 from ..core.stopwatch import Stopwatch
 from ..input.options import Callback
 
-__all__ = ["Progress"]
+__all__ = ["Monitor"]
 
 
-class Progress:
+class Monitor:
     """Counts of every sweep, seconds of every phase.
 
     Attributes
