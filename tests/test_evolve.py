@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from remeshvec import OptionError, read_mesh
 from remeshvec.evolver import CapillaryProblem, cut_necks, evolve, write_frames
-from remeshvec.evolver.evolve import _Run
+from remeshvec.evolver.reshape import remeshed
 
 RINGS = Path(__file__).resolve().parents[2] / "shared/data/flotation/three_rings.json"
 
@@ -317,9 +317,8 @@ def rings(volume):
 @pytest.mark.skipif(not RINGS.exists(), reason="the data of the report is not here")
 def test_fluid_on_three_rings():
     problem = rings("volume_full")
-    run = _Run(problem, lambda *a, **k: None, True, False, False, None)
-    run.remesh(16.0, 1.5, 0.5)
-    assert run.now.total_volume() == pytest.approx(problem.volume, rel=1e-10)
+    finer = remeshed(problem, 16.0, 1.5, 0.5)
+    assert finer.total_volume() == pytest.approx(problem.volume, rel=1e-10)
     done = evolve(problem, [16.0, 8.0])
     assert done.minimum.converged and done.n_cuts == 0
     assert 4384 < done.minimum.energy < 4395

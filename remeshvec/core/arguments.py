@@ -16,7 +16,17 @@ import numpy as np
 
 from ..errors import OptionError
 
-__all__ = ["choice", "count", "flag", "function", "number", "path", "text"]
+__all__ = [
+    "choice",
+    "count",
+    "flag",
+    "function",
+    "instance",
+    "items",
+    "number",
+    "path",
+    "text",
+]
 
 _MOST_SHOWN = 80  # characters of a wrong value in a message
 
@@ -100,11 +110,12 @@ def _range(
     return f"{noun} {' and '.join(bounds)}" if bounds else f"{noun}, finite"
 
 
-def count(value: Any, name: str, *, low: int = 1) -> int:
-    """Check a whole number that is at least ``low``, and return it as an int."""
+def count(value: Any, name: str, *, low: int = 1, high: int | None = None) -> int:
+    """Check a whole number from ``low`` to ``high``, both included, and return it as an int."""
     is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool | np.bool_)
-    if not is_whole or value < low:
-        raise OptionError(f"{name} must be a whole number, at least {low}; got {_shown(value)}")
+    if not is_whole or value < low or (high is not None and value > high):
+        bounds = f", at least {low}" if high is None else f" from {low} to {high}"
+        raise OptionError(f"{name} must be a whole number{bounds}; got {_shown(value)}")
     return int(value)
 
 
@@ -145,3 +156,18 @@ def function(value: Any, name: str) -> Any:
     if not callable(value):
         raise OptionError(f"{name} must be callable; got {_shown(value)}")
     return value
+
+
+def instance(value: Any, name: str, kind: type | tuple[type, ...], noun: str) -> Any:
+    """Check a value by its type; ``noun`` says in the message what is allowed."""
+    if not isinstance(value, kind):
+        raise OptionError(f"{name} must be {noun}; got {_shown(value)}")
+    return value
+
+
+def items(value: Any, name: str, noun: str) -> list[Any]:
+    """Check a sequence that is not a string; ``noun`` says in the message what it must hold."""
+    is_text = isinstance(value, str | bytes)
+    if is_text or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
+        raise OptionError(f"{name} must be a sequence of {noun}; got {_shown(value)}")
+    return list(value)

@@ -16,6 +16,7 @@ __all__ = [
     "as_indices",
     "as_mask",
     "as_mesh",
+    "as_values",
     "as_vertices",
     "positive_count",
     "positive_number",
@@ -144,6 +145,40 @@ def as_indices(value: Any, count: int, name: str, noun: str) -> NDArray[np.int64
             f"{name}[{bad[0]}] = {array[bad[0]]} is not a {noun} index; they run from 0 to {count - 1}"
         )
     return array.astype(np.int64)
+
+
+def as_values(value: Any, name: str, *shapes: tuple[int | str, ...]) -> NDArray[np.float64]:
+    """Check finite real numbers of one of several shapes, and cast them to float64; always a copy.
+
+    Parameters
+    ----------
+    value : object
+        What the caller gave.
+    name : str
+        Name of the argument, for the message.
+    *shapes : tuple
+        Shapes that are allowed; a letter stands for any length: ``(n, "c")``.
+    """
+    array = as_array(value, name)
+    if array.dtype.kind not in "fiu" or not any(_fits(array.shape, shape) for shape in shapes):
+        wanted = " or ".join(_shape_text(shape) for shape in shapes)
+        raise OptionError(
+            f"{name} must hold real numbers in shape {wanted}; got {array.shape} of {array.dtype}"
+        )
+    if not np.isfinite(array).all():
+        bad = np.flatnonzero(~np.isfinite(array.reshape(len(array), -1)).all(axis=1))
+        raise OptionError(f"{which(bad, 'row')} of {name} are NaN or infinite")
+    return array.astype(np.float64, order="C")
+
+
+def _fits(shape: tuple[int, ...], wanted: tuple[int | str, ...]) -> bool:
+    return len(shape) == len(wanted) and all(
+        isinstance(b, str) or a == b for a, b in zip(shape, wanted, strict=True)
+    )
+
+
+def _shape_text(shape: tuple[int | str, ...]) -> str:
+    return f"({', '.join(str(length) for length in shape)}{',' * (len(shape) == 1)})"
 
 
 def as_array(value: Any, name: str, error: type[RemeshvecError] = OptionError) -> NDArray[Any]:

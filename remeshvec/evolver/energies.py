@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from ..core.vocabulary import FloatArray, IntArray
 
 __all__ = ["Potential", "areas", "gradients", "hessian", "potentials", "volumes"]
 
-Potential = NDArray[np.float64]  # (3,) gradient a of the fluid's potential energy density, or zeros
+Potential = FloatArray  # (3,) gradient a of the fluid's potential energy density, or zeros
 
 # Sign of the derivative along corner i, then corner j: d2N = x_i' x x_j' for j after i.
 _SIGN = np.array([[0.0, 1.0, -1.0], [-1.0, 0.0, 1.0], [1.0, -1.0, 0.0]])

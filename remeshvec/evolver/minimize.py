@@ -15,19 +15,33 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from ..core.check import positive_count, positive_number
-from ..core.vocabulary import FloatArray
-from ..errors import OptionError
+from ..core.arguments import choice, count, function, number
+from ..core.vocabulary import FloatArray, IntArray
 from ..modelling.solver import LaplacianSolver
-from .problem import CapillaryProblem, Forces
+from .forces import Forces, body_volumes_at, energy_at, forces_at, hessian_at
+from .problem import CapillaryProblem, as_problem, with_surface
 
-__all__ = ["Minimum", "measured", "minimize", "restore_volumes"]
+__all__ = [
+    "METHODS",
+    "Minimum",
+    "StepCallback",
+    "measured",
+    "minimize",
+    "unmoved",
+    "with_restored_volumes",
+]
+
+METHODS = ("flow", "newton")
+StepCallback = Callable[[int, CapillaryProblem, float, float], object]
+
+# Steps at most, where the caller does not say.
+_MOST_STEPS = {"flow": 200, "newton": 50}
 
 # Halvings of a step before it counts as impossible.
 _HALVINGS = 12
 
-# Corrections of the volume after a step; each squares the error.
-_CORRECTIONS = 20
+# Corrections of the volume after a step, each of which squares the error.
+_VOLUME_CORRECTIONS = 20
 _VOLUME_ERROR = 1e-12  # relative
 
 # Added to the diagonal of the stiffness matrix, relative to it: holds components without fixed vertices
@@ -80,12 +94,9 @@ class Minimum:
         return self.problem.V
 
     @property
-    def F(self) -> NDArray[np.int64]:
+    def F(self) -> IntArray:
         """Faces (m, 3)."""
         return self.problem.F
-
-
-Callback = Callable[[int, CapillaryProblem, float, float], object]
 
 
 def minimize(
@@ -94,7 +105,7 @@ def minimize(
     *,
     tol: float = 1e-6,
     steps: int | None = None,
-    callback: Callback | None = None,
+    callback: StepCallback | None = None,
 ) -> Minimum:
     """Move the free vertices to where the energy is least, on the triangles that there are.
 
@@ -124,14 +135,17 @@ def minimize(
     OptionError
         Options that do not exist.
     """
-    tolerance = positive_number(tol, "tol", "no unit")
-    if method not in ("flow", "newton"):
-        raise OptionError(f"method must be one of flow, newton; got {method!r}")
-    most = positive_count({"flow": 200, "newton": 50}[method] if steps is None else steps, "steps")
-    advance = _flow_step if method == "flow" else _newton_step
+    as_problem(problem)
+    tolerance = number(tol, "tol", above=0.0)
+    advance = {"flow": _flow_step, "newton": _newton_step}[choice(method, "method", METHODS)]
+    most = _MOST_STEPS[method] if steps is None else count(steps, "steps")
+    if callback is not None:
+        function(callback, "callback")
+    if not len(problem.F):
+        return unmoved(problem, "nothing is left")
     if not problem.free.any():
-        return _minimum(problem, np.zeros(len(problem.targets)), 0.0, tolerance, "all is fixed", [])
-    now = problem.with_mesh(restore_volumes(problem))
+        return unmoved(problem, "all is fixed")
+    now = with_restored_volumes(problem)
     history: list[dict[str, float]] = []
     pressure, residual = _balance(now, now.forces())
     stop = "all steps done"
@@ -143,7 +157,7 @@ def minimize(
         if moved is None:
             stop = "no step lowers the energy"
             break
-        now = now.with_mesh(moved)
+        now = with_surface(now, moved)
         pressure, residual = _balance(now, now.forces())
         history.append({"energy": now.energy(), "residual": residual})
         if callback is not None and callback(step, now, now.energy(), residual) is False:
@@ -155,9 +169,14 @@ def minimize(
 
 
 def measured(problem: CapillaryProblem, tolerance: float, stop: str) -> Minimum:
-    """Describe where a surface is."""
+    """Describe a surface as it is, with its pressures and its residual."""
     pressure, residual = _balance(problem, problem.forces())
     return _minimum(problem, pressure, residual, tolerance, stop, [])
+
+
+def unmoved(problem: CapillaryProblem, stop: str) -> Minimum:
+    """Describe a surface that cannot move: no vertex is free, or no face is left."""
+    return _minimum(problem, np.zeros(len(problem.targets)), 0.0, 0.0, stop, [])
 
 
 def _minimum(
@@ -212,23 +231,23 @@ def _balance(problem: CapillaryProblem, forces: Forces) -> tuple[FloatArray, flo
     return multiplier[: len(volume)], residual
 
 
-def restore_volumes(problem: CapillaryProblem) -> FloatArray:
-    """Return vertices moved along normals until every body has its volume."""
-    return _with_volumes(problem, problem.V, problem.forces().volume)
+def with_restored_volumes(problem: CapillaryProblem) -> CapillaryProblem:
+    """Return the problem with its vertices moved along normals until every body has its volume."""
+    return with_surface(problem, _corrected(problem, problem.V, problem.forces().volume))
 
 
-def _with_volumes(problem: CapillaryProblem, X: FloatArray, directions: FloatArray) -> FloatArray:
-    """Restore the volumes by moving along one field (g, n, 3) a body."""
+def _corrected(problem: CapillaryProblem, X: FloatArray, directions: FloatArray) -> FloatArray:
+    """Restore the volumes by moving along one field (g, n, 3) per body."""
     if not len(problem.targets):
         return X
     free = problem.free[None, :, None]
     along = np.where(free, directions, 0.0)
-    scale = np.maximum(np.abs(problem.targets), np.abs(problem.body_volumes(X))).max()
-    for _ in range(_CORRECTIONS):
-        error = problem.targets - problem.body_volumes(X)
+    scale = np.maximum(np.abs(problem.targets), np.abs(body_volumes_at(problem, X))).max()
+    for _ in range(_VOLUME_CORRECTIONS):
+        error = problem.targets - body_volumes_at(problem, X)
         if np.abs(error).max() <= _VOLUME_ERROR * scale:
             break
-        gain = np.einsum("gnx,hnx->gh", problem.forces(X).volume, along)
+        gain = np.einsum("gnx,hnx->gh", forces_at(problem, X).volume, along)
         X = X + np.einsum("h,hnx->nx", np.linalg.lstsq(gain, error, rcond=None)[0], along)
     return X
 
@@ -240,8 +259,8 @@ def _searched(
     before = problem.energy()
     size = 1.0
     for _ in range(_HALVINGS):
-        X = _with_volumes(problem, problem.V + size * step, directions)
-        energy = problem.energy(X)
+        X = _corrected(problem, problem.V + size * step, directions)
+        energy = energy_at(problem, X)
         if np.isfinite(energy) and energy <= before + slack * abs(before):
             return X
         size *= 0.5
@@ -289,7 +308,7 @@ def _newton_step(
     """Step of normal motions to where the quadratic model of the Lagrangian is stationary."""
     normal, area = _normals(problem)
     free = np.flatnonzero(problem.free & (area > 0.0))
-    H = problem.hessian(normal[:, None], pressure)[free][:, free]
+    H = hessian_at(problem, problem.V, normal[:, None], pressure)[free][:, free]
     H = sp.csc_array((H + H.T) * 0.5)
     force = np.einsum("nx,nx->n", forces.energy, normal)[free]
     G = np.einsum("gnx,nx->gn", forces.volume, normal)[:, free].T

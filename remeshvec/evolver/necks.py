@@ -11,10 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
+from numpy.typing import ArrayLike
 
-from ..core.vocabulary import FloatArray, IntArray
+from ..core.arguments import number
+from ..core.check import as_mask, as_mesh
+from ..core.vocabulary import BoolArray, FloatArray, IntArray
+from ..mesh.edges import components, edge_keys, halfedge_ends, unique_edges
 from .energies import areas
 
 __all__ = ["Cut", "cut_necks"]
@@ -35,36 +37,45 @@ class Cut(NamedTuple):
     n_cuts: int
 
 
-def cut_necks(V: FloatArray, F: IntArray, held: NDArray[np.bool_], perimeter: float = 0.0) -> Cut:
+def cut_necks(V: ArrayLike, F: ArrayLike, held: ArrayLike, perimeter: float = 0.0) -> Cut:
     """Cut every neck of three edges, and those of four that are short.
 
     Parameters
     ----------
-    V : (n, 3) float64
+    V : (n, 3) float
     F : (m, 3) int
         A manifold with faces of one winding.
-    held : (n,) bool
+    held : (k,) int or (n,) bool
         Vertices that no cut may go through.
     perimeter : float
-        Longest perimeter of a neck of four edges.
+        Longest perimeter of a neck of four edges, in units of V.
 
     Returns
     -------
     Cut
-        Also a manifold. Each cut adds its vertices and two caps.
+        Also a manifold. Each cut adds its vertices and two caps. Without a cut, V and F may be the
+        caller's own arrays.
+
+    Raises
+    ------
+    MeshInputError
+        V and F are not a mesh.
+    OptionError
+        An index is out of range, or the perimeter is negative.
     """
-    source = np.arange(len(V))
+    vertices, faces = as_mesh(V, F)
+    is_held = as_mask(held, len(vertices), "held", "vertex")
+    longest = number(perimeter, "perimeter", low=0.0, unit="units of V")
+    source = np.arange(len(vertices))
     count = 0
-    # One at a time: cuts may share edges, and each changes what others see. There are few.
-    while (cycle := _next_cycle(V, F, held[source], perimeter)) is not None:
-        V, F, source = _split(V, F, source, cycle)
+    # One at a time: cuts may share edges, and each changes the cycles of the others. There are few.
+    while (cycle := _next_cycle(vertices, faces, is_held[source], longest)) is not None:
+        vertices, faces, source = _split(vertices, faces, source, cycle)
         count += 1
-    return Cut(V, F, source, count)
+    return Cut(vertices, faces, source, count)
 
 
-def _next_cycle(
-    V: FloatArray, F: IntArray, held: NDArray[np.bool_], perimeter: float
-) -> Cycle | None:
+def _next_cycle(V: FloatArray, F: IntArray, held: BoolArray, perimeter: float) -> Cycle | None:
     """Return the shortest cycle that is a neck."""
     sizes = []
     for cycle in _cycles(F, held, len(V), 4 if perimeter > 0.0 else 3):
@@ -75,15 +86,16 @@ def _next_cycle(
     return next((cycle for _, cycle in sorted(sizes) if _is_neck(V, F, cycle)), None)
 
 
-def _cycles(F: IntArray, held: NDArray[np.bool_], n: int, longest: int) -> list[Cycle]:
+def _cycles(F: IntArray, held: BoolArray, n: int, longest: int) -> list[Cycle]:
     """Cycles of three edges that are no face, and of four without a diagonal."""
-    edges = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
-    edges = np.unique(edges[~held[edges].any(axis=1)], axis=0)
+    edges = unique_edges(F)
+    edges = edges[~held[edges].any(axis=1)]
     both = np.concatenate([edges, edges[:, ::-1]])
     near = sp.csr_array((np.ones(len(both), np.int64), (both[:, 0], both[:, 1])), (n, n))
-    # Ends of edges have as many common neighbours as the edge has faces, but for what is looked for.
+    # The ends of an edge have one common neighbour per face of the edge; each further one closes a
+    # cycle of three.
     paths = sp.triu(near @ near, 1).tocoo()
-    is_edge = np.isin(paths.row * n + paths.col, edges[:, 0] * n + edges[:, 1])
+    is_edge = np.isin(paths.row * n + paths.col, edge_keys(edges.T, n))
     closed = is_edge & (paths.data > 2)
     crossed = ~is_edge & (paths.data > 1) & (longest > 3)
     around: dict[int, set[int]] = {}
@@ -121,20 +133,17 @@ def _is_neck(V: FloatArray, F: IntArray, cycle: Cycle) -> bool:
     return True
 
 
-def _reached(F: IntArray, seeds: IntArray, cycle: Cycle) -> NDArray[np.bool_]:
-    """Faces that hang together with some across edges that are not on the cycle."""
-    m = len(F)
-    half = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
-    low, high = np.sort(half, axis=1).T
-    key = low * (F.max() + 1) + high
+def _reached(F: IntArray, seeds: IntArray, cycle: Cycle) -> BoolArray:
+    """Faces that are connected to the seeds across edges that are not on the cycle."""
+    ends = halfedge_ends(F)
+    start, end = ends
+    key = edge_keys(ends, F.max() + 1)
     order = np.argsort(key, kind="stable")
     same = key[order][1:] == key[order][:-1]
-    on_cycle = np.isin(low, cycle) & np.isin(high, cycle)
-    f, g = order[:-1][same], order[1:][same]
-    crossing = ~on_cycle[f]
-    f, g = f[crossing] % m, g[crossing] % m
-    graph = sp.coo_array((np.ones(len(f)), (f, g)), (m, m))
-    part = connected_components(graph, directed=False)[1]
+    on_cycle = np.isin(start, cycle) & np.isin(end, cycle)
+    g, h = order[:-1][same], order[1:][same]
+    crossing = ~on_cycle[g]
+    _, part = components(len(F), g[crossing] // 3, h[crossing] // 3)
     return np.isin(part, part[seeds])
 
 

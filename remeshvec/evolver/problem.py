@@ -1,40 +1,35 @@
-"""The problem: a surface under tension, what it encloses, and what holds it."""
+"""The problem: a surface under tension, the volume that it encloses, and the wires that hold it."""
 
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
-from scipy.sparse.csgraph import connected_components
+from numpy.typing import ArrayLike
 
-from ..core.check import as_array, as_indices, as_mask, as_mesh, positive_number, which
-from ..core.vocabulary import FloatArray, IntArray
+from ..core.arguments import choice, instance, number
+from ..core.check import as_array, as_indices, as_mask, as_mesh, as_values, which
+from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
+from ..mesh.edges import components, halfedge_ends
 from ..mesh.repair import count_edges
-from .energies import areas, gradients, hessian, potentials, volumes
+from .energies import areas, volumes
+from .forces import Forces, body_volumes_at, energy_at, forces_at, hessian_at
 
-__all__ = ["CapillaryProblem", "Forces"]
+__all__ = ["VOLUMES", "CapillaryProblem", "as_problem", "with_surface"]
 
-
-@dataclass(frozen=True)
-class Forces:
-    """First derivatives at all vertices."""
-
-    energy: FloatArray  # (n, 3) gradient of the energy
-    volume: FloatArray  # (g, n, 3) gradient of the volume of every body
+VOLUMES = ("shared", "per_component")
 
 
 class CapillaryProblem:
     """A capillary surface: the energy to be minimised, the volume to be kept, and the wires.
 
     The energy is ``tension * area + energy of the fluid in gravity + energy_offset``. The fluid fills
-    what the surface encloses; its energy is ``-density * gravity . x`` integrated over that, as a surface
+    the inside of the surface; its energy is ``-density * gravity . x`` integrated over that, as a surface
     integral that is exact on flat triangles. For a surface that is not closed, area, volume and energy
-    are those of its faces, as seen from the origin; what is missing (flat caps that do not move, say) is
+    are those of its faces, as seen from the origin; the missing part (flat caps that do not move, say) is
     a constant, which the offsets add.
 
     Parameters
@@ -44,17 +39,17 @@ class CapillaryProblem:
     F : (m, 3) int
         Faces, of one winding; the volume is positive where they run counterclockwise from outside.
     fixed : (k,) int or (n,) bool, optional
-        Vertices that never move. The ends of fixed edges are fixed besides.
+        Vertices that never move, besides the ends of fixed edges.
     fixed_edges : (k, 2) int, optional
         Wires: edges that are never moved, split or collapsed. By default, the boundary.
     tension : float
         Energy per area.
     volume : float, optional
-        What has to be enclosed, offset included; by default nothing is prescribed.
+        The volume to enclose, offset included; by default none is prescribed.
     volume_offset, energy_offset : float
         Added to the volume and the energy of the faces.
     density : float
-        Mass per volume of the fluid minus that of what is around it.
+        Mass per volume of the fluid minus that of its surroundings.
     gravity : (3,) float
         Acceleration.
     bodies : {"shared", "per_component"}
@@ -73,10 +68,10 @@ class CapillaryProblem:
     Raises
     ------
     MeshInputError
-        V and F are no mesh; or they enclose nothing in particular, because two faces run an edge the
-        same way, where a volume or a density is given.
+        V and F are not a mesh; or a volume or a density is given, but two faces run an edge the same way,
+        so that nothing has an inside.
     OptionError
-        Indices out of range, numbers that are not positive or finite.
+        An index is out of range, or a number is not finite or not positive where it must be.
     """
 
     def __init__(
@@ -95,37 +90,23 @@ class CapillaryProblem:
         bodies: Literal["shared", "per_component"] = "shared",
     ) -> None:
         vertices, faces = as_mesh(V, F)
-        n = len(vertices)
-        if fixed_edges is None:
-            edges, uses = count_edges(faces)
-            edges = edges[uses == 1]
-        else:
-            edges = _edges(fixed_edges, n)
-        mask = np.zeros(n, np.bool_) if fixed is None else as_mask(fixed, n, "fixed", "vertex")
-        mask[edges] = True
-        mask |= np.bincount(faces.ravel(), minlength=n) == 0
         self.V, self.F = vertices.copy(), faces.copy()
-        self.fixed, self.fixed_edges = mask, edges
-        self.tension = positive_number(tension, "tension", "energy per area")
-        self.volume = None if volume is None else _finite(volume, "volume")
-        self.volume_offset = _finite(volume_offset, "volume_offset")
-        self.energy_offset = _finite(energy_offset, "energy_offset")
-        self.density = _finite(density, "density")
-        self.gravity = np.array([_finite(g, "gravity") for g in as_array(gravity, "gravity")])
-        if self.gravity.shape != (3,):
-            raise OptionError(f"gravity must have 3 components; got {self.gravity.shape}")
-        if bodies not in ("shared", "per_component"):
-            raise OptionError(f"bodies must be one of shared, per_component; got {bodies!r}")
+        self.fixed, self.fixed_edges = _wires(len(self.V), self.F, fixed, fixed_edges)
+        self.tension = number(tension, "tension", above=0.0, unit="energy per area")
+        self.volume = None if volume is None else number(volume, "volume")
+        self.volume_offset = number(volume_offset, "volume_offset")
+        self.energy_offset = number(energy_offset, "energy_offset")
+        self.density = number(density, "density")
+        self.gravity = as_values(gravity, "gravity", (3,))
+        is_apart = choice(bodies, "bodies", VOLUMES) == "per_component"
         if self.volume is not None or self.density:
-            _check_winding(faces)
-        self.body = np.zeros(len(faces), np.int64)  # of every face
-        # Volume of every body without the offset.
+            _check_winding(self.F)
+        self.body = np.zeros(len(self.F), np.int64)
         self.targets = np.empty(0)
         if self.volume is not None:
             self.targets = np.array([self.volume - self.volume_offset])
-            if bodies == "per_component":
-                apart = self.taken_apart()
-                self.body, self.targets = apart.body, apart.targets
+        if is_apart:
+            self.body, self.targets = _apart(self)
 
     @property
     def potential(self) -> FloatArray:
@@ -133,89 +114,150 @@ class CapillaryProblem:
         return -self.density * self.gravity
 
     @property
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> BoolArray:
         """Vertices that move."""
         return ~self.fixed
 
-    def area(self, V: FloatArray | None = None) -> float:
-        """Area of the faces."""
-        return float(areas(self._corners(V)).sum())
+    def area(self, V: ArrayLike | None = None) -> float:
+        """Area of the faces, with vertices V (by default its own)."""
+        return float(areas(self._at(V)[self.F]).sum())
 
-    def energy(self, V: FloatArray | None = None) -> float:
+    def energy(self, V: ArrayLike | None = None) -> float:
         """Energy, offset included."""
-        T = self._corners(V)
-        total = self.tension * areas(T).sum() + potentials(T, self.potential).sum()
-        return float(total) + self.energy_offset
+        return energy_at(self, self._at(V))
 
-    def total_volume(self, V: FloatArray | None = None) -> float:
+    def total_volume(self, V: ArrayLike | None = None) -> float:
         """Volume of all bodies together, offset included."""
-        return float(volumes(self._corners(V)).sum()) + self.volume_offset
+        return float(volumes(self._at(V)[self.F]).sum()) + self.volume_offset
 
-    def body_volumes(self, V: FloatArray | None = None) -> FloatArray:
+    def body_volumes(self, V: ArrayLike | None = None) -> FloatArray:
         """Volume (g,) of the faces of every body with a prescribed one."""
-        count = len(self.targets)
-        found = np.bincount(self.body, volumes(self._corners(V)), count)
-        return np.asarray(found[:count], np.float64)
+        return body_volumes_at(self, self._at(V))
 
-    def forces(self, V: FloatArray | None = None) -> Forces:
+    def forces(self, V: ArrayLike | None = None) -> Forces:
         """Gradients of energy and volumes."""
-        area, volume, potential = gradients(self._corners(V), self.potential)
-        n = len(self.V)
-        energy = _at_vertices(self.F, self.tension * area + potential, n)
-        each = np.stack(
-            [
-                _at_vertices(self.F[self.body == g], volume[self.body == g], n)
-                for g in range(len(self.targets))
-            ]
-            or [np.empty((0, n, 3))]
-        ).reshape(-1, n, 3)
-        return Forces(energy, each)
+        return forces_at(self, self._at(V))
 
     def hessian(
-        self, directions: FloatArray, pressure: FloatArray, V: FloatArray | None = None
+        self, directions: ArrayLike, pressure: ArrayLike, V: ArrayLike | None = None
     ) -> sp.csr_array:
         """Second derivatives of ``energy - pressure . volumes`` along directions (n, d, 3)."""
-        X = self.V if V is None else V
-        each = np.append(pressure, 0.0)[np.minimum(self.body, len(pressure))]
-        return hessian(X, self.F, directions, self.potential, self.tension, each)
+        along = as_values(directions, "directions", (len(self.V), "d", 3))
+        p = as_values(pressure, "pressure", (len(self.targets),))
+        return hessian_at(self, self._at(V), along, p)
 
-    def with_mesh(self, V: FloatArray, **changes: Any) -> CapillaryProblem:
-        """Return the problem with other vertices, and perhaps other faces."""
-        problem = copy(self)
-        for name, value in {"V": V, **changes}.items():
-            setattr(problem, name, value)
-        return problem
+    def with_mesh(
+        self,
+        V: ArrayLike,
+        F: ArrayLike | None = None,
+        *,
+        fixed: ArrayLike | None = None,
+        fixed_edges: ArrayLike | None = None,
+        body: ArrayLike | None = None,
+    ) -> CapillaryProblem:
+        """Return the problem with other vertices, and perhaps other faces.
+
+        Arguments that are left out stay as they are.
+
+        Raises
+        ------
+        MeshInputError
+            V and F are not a mesh.
+        OptionError
+            The number of vertices changes without ``fixed`` and ``fixed_edges``, or that of faces without
+            ``body``; or an index is out of range.
+        """
+        vertices, faces = as_mesh(V, self.F if F is None else F)
+        n, m = len(vertices), len(faces)
+        if n != len(self.V) and (fixed is None or fixed_edges is None):
+            raise OptionError(f"V has {n} vertices, not {len(self.V)}: give fixed and fixed_edges")
+        if m != len(self.F) and body is None:
+            raise OptionError(f"F has {m} faces, not {len(self.F)}: give body")
+        return with_surface(
+            self,
+            vertices.copy(),
+            faces.copy(),
+            fixed=None if fixed is None else as_mask(fixed, n, "fixed", "vertex"),
+            fixed_edges=None if fixed_edges is None else _as_edges(fixed_edges, n),
+            body=None if body is None else _as_bodies(body, m, len(self.targets)),
+        )
 
     def components(self) -> tuple[int, IntArray]:
         """Count the components, and number them for every face."""
-        i, j = self.F[:, [0, 1, 2]].ravel(), self.F[:, [1, 2, 0]].ravel()
-        graph = sp.coo_array((np.ones(len(i)), (i, j)), (len(self.V), len(self.V)))
-        label = connected_components(graph, directed=False)[1][self.F[:, 0]]
-        names, body = np.unique(label, return_inverse=True)
+        _, label = components(len(self.V), *halfedge_ends(self.F))
+        names, body = np.unique(label[self.F[:, 0]], return_inverse=True)
         return len(names), body
 
     def taken_apart(self) -> CapillaryProblem:
-        """Return the problem with a body a component, which keep the share of volume they have now."""
-        count, body = self.components()
-        now = np.bincount(body, volumes(self._corners(None)), count)
-        if not len(self.targets):
-            return self
-        # What is missing or too much is distributed by area.
-        missing = self.targets.sum() - now.sum()
-        share = np.bincount(body, areas(self._corners(None)), count)
-        targets = now + missing * share / share.sum()
-        return self.with_mesh(self.V, body=body, targets=targets)
+        """Return the problem with one body per component, each of which keeps its share of the volume."""
+        body, targets = _apart(self)
+        return with_surface(self, self.V, body=body, targets=targets)
 
-    def _corners(self, V: FloatArray | None) -> FloatArray:
-        return (self.V if V is None else V)[self.F]
+    def _at(self, V: ArrayLike | None) -> FloatArray:
+        return self.V if V is None else as_values(V, "V", self.V.shape)
+
+
+def as_problem(value: object) -> CapillaryProblem:
+    """Check that something is a problem."""
+    problem: CapillaryProblem = instance(value, "problem", CapillaryProblem, "a CapillaryProblem")
+    return problem
+
+
+def with_surface(
+    problem: CapillaryProblem,
+    V: FloatArray,
+    F: IntArray | None = None,
+    *,
+    fixed: BoolArray | None = None,
+    fixed_edges: IntArray | None = None,
+    body: IntArray | None = None,
+    targets: FloatArray | None = None,
+) -> CapillaryProblem:
+    """Return the problem with another surface; arguments that are left out stay. Nothing is checked."""
+    other = copy(problem)
+    other.V = V
+    other.F = problem.F if F is None else F
+    other.fixed = problem.fixed if fixed is None else fixed
+    other.fixed_edges = problem.fixed_edges if fixed_edges is None else fixed_edges
+    other.body = problem.body if body is None else body
+    other.targets = problem.targets if targets is None else targets
+    return other
+
+
+def _apart(problem: CapillaryProblem) -> tuple[IntArray, FloatArray]:
+    """Body of every face and targets, with one body per component where a volume is prescribed."""
+    if not len(problem.targets):
+        return problem.body, problem.targets
+    count, body = problem.components()
+    T = problem.V[problem.F]
+    now = np.bincount(body, volumes(T), count)
+    # The difference between what is prescribed and what is there is distributed by area.
+    missing = problem.targets.sum() - now.sum()
+    share = np.bincount(body, areas(T), count)
+    return body, now + missing * share / share.sum()
+
+
+def _wires(
+    n: int, F: IntArray, fixed: ArrayLike | None, fixed_edges: ArrayLike | None
+) -> tuple[BoolArray, IntArray]:
+    """Mask of fixed vertices, those that no face uses among them, and the fixed edges."""
+    if fixed_edges is None:
+        edges, uses = count_edges(F)
+        edges = edges[uses == 1]
+    else:
+        edges = _as_edges(fixed_edges, n)
+    mask = np.zeros(n, np.bool_) if fixed is None else as_mask(fixed, n, "fixed", "vertex")
+    mask[edges] = True
+    mask |= np.bincount(F.ravel(), minlength=n) == 0
+    return mask, edges
 
 
 def _check_winding(F: IntArray) -> None:
     """Refuse faces that run an edge the same way: there is no inside then."""
-    half = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
-    key = half[:, 0] * (F.max() + 1) + half[:, 1]
+    start, end = halfedge_ends(F)
+    key = start * (F.max() + 1) + end
     _, index, count = np.unique(key, return_index=True, return_counts=True)
-    bad = np.unique(index[count > 1] % len(F))
+    bad = np.unique(index[count > 1] // 3)
     if len(bad):
         raise MeshInputError(
             f"{which(bad, 'face')} of F run an edge the same way as another, so that no volume is "
@@ -223,14 +265,7 @@ def _check_winding(F: IntArray) -> None:
         )
 
 
-def _at_vertices(F: IntArray, corners: FloatArray, n: int) -> FloatArray:
-    """Add up vectors (m, 3, 3) of corners at their vertices."""
-    index = F.ravel()
-    flat = corners.reshape(-1, 3)
-    return np.stack([np.bincount(index, flat[:, c], n) for c in range(3)], axis=1)
-
-
-def _edges(value: ArrayLike, n: int) -> IntArray:
+def _as_edges(value: ArrayLike, n: int) -> IntArray:
     array = as_array(value, "fixed_edges")
     if array.size == 0:
         return np.empty((0, 2), np.int64)
@@ -240,11 +275,8 @@ def _edges(value: ArrayLike, n: int) -> IntArray:
     return np.stack(ends, axis=1)
 
 
-def _finite(value: Any, name: str) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = np.nan
-    if isinstance(value, bool) or not np.isfinite(number):
-        raise OptionError(f"{name} must be a finite number; got {value!r}")
-    return number
+def _as_bodies(value: ArrayLike, m: int, count: int) -> IntArray:
+    body = as_indices(value, max(1, count), "body", "body")
+    if len(body) != m:
+        raise OptionError(f"body must have shape ({m},), one number per face; got {body.shape}")
+    return body

@@ -11,22 +11,25 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..core.check import positive_number
-from ..core.vocabulary import FloatArray, IntArray
+from ..core.arguments import choice, count, function, number, text
+from ..core.arguments import path as as_path
+from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshFormatError, OptionError
+from ..files.plain import reason, write_file
+from ..mesh.edges import halfedge_ends
 from .errors import EvolverError
-from .minimize import Minimum, measured, restore_volumes
-from .problem import CapillaryProblem
+from .minimize import METHODS, Minimum, StepCallback, measured, with_restored_volumes
+from .problem import CapillaryProblem, as_problem, with_surface
 
 __all__ = ["EvolverBackend", "read_dump", "write_fe"]
 
+# Steps at most, where the caller does not say.
+_MOST_STEPS = {"flow": 10, "newton": 8}
 
 # Gradient steps before Newton steps are tried, and those that count as a step of the flow.
 _WARM_UP, _GRADIENT_STEPS = 5, 20
@@ -50,6 +53,8 @@ def write_fe(path: str | Path, problem: CapillaryProblem) -> Path:
     OptionError
         Gravity along another axis than -z: Surface Evolver has no other.
     """
+    as_problem(problem)
+    file = Path(as_path(path, "path"))
     if problem.density and np.any(problem.gravity[:2]):
         raise OptionError("Surface Evolver knows gravity along z only; turn the problem")
     edges, of_face = _numbered_edges(problem.F)
@@ -65,8 +70,7 @@ def write_fe(path: str | Path, problem: CapillaryProblem) -> Path:
     for k, (a, b, c) in enumerate(of_face.tolist()):
         lines.append(f"{k + 1} {a} {b} {c} tension {problem.tension!r}")
     lines += ["", *_bodies(problem), "read", ""]
-    file = Path(path)
-    file.write_text("\n".join(lines), encoding="ascii")
+    write_file(file, "\n".join(lines).encode("ascii"))
     return file
 
 
@@ -86,13 +90,13 @@ def _bodies(problem: CapillaryProblem) -> list[str]:
 
 def _numbered_edges(F: IntArray) -> tuple[IntArray, IntArray]:
     """Edges (k, 2), and of every face the numbers of its three, from 1, negative where it runs back."""
-    half = np.stack([F, np.roll(F, -1, axis=1)], axis=2).reshape(-1, 2)
-    edges, number = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
-    sign = np.where(half[:, 0] < half[:, 1], 1, -1)
-    return edges, ((number.ravel() + 1) * sign).reshape(-1, 3)
+    start, end = halfedge_ends(F)
+    edges, index = np.unique(np.sort([start, end], axis=0), axis=1, return_inverse=True)
+    sign = np.where(start < end, 1, -1)
+    return edges.T, ((index.ravel() + 1) * sign).reshape(-1, 3)
 
 
-def read_dump(path: str | Path) -> tuple[FloatArray, IntArray, NDArray[np.bool_]]:
+def read_dump(path: str | Path) -> tuple[FloatArray, IntArray, BoolArray]:
     """Read vertices, faces and fixed vertices from a dump, or from a datafile of plain triangles.
 
     Returns
@@ -105,35 +109,44 @@ def read_dump(path: str | Path) -> tuple[FloatArray, IntArray, NDArray[np.bool_]
     Raises
     ------
     MeshFormatError
-        A section is missing, or faces that are no triangles.
+        The file cannot be read, lacks a section, or has faces that are not triangles.
     """
-    text = _COMMENT.sub(" ", Path(path).read_text(encoding="latin-1")).replace("\\\n", " ")
-    parts = _SECTION.split(text)
-    sections = {
-        name.lower().replace("facets", "faces"): body
-        for name, body in zip(parts[1::2], parts[2::2], strict=True)
-    }
+    file = Path(as_path(path, "path"))
     try:
+        sections = _sections(file.read_text(encoding="latin-1"))
         vertices = _records(sections["vertices"])
         edges = {k: (int(row[0]), int(row[1])) for k, row in _records(sections["edges"]).items()}
-        faces = _records(sections["faces"])
-        number = {k: i for i, k in enumerate(sorted(vertices))}
-        V = np.array([[float(x) for x in vertices[k][:3]] for k in sorted(vertices)])
-        F = []
-        for k in sorted(faces):
-            start = []
-            for word in faces[k][:3]:
-                e = int(word)
-                start.append(number[edges[abs(e)][0 if e > 0 else 1]])
-            F.append(start)
-            if len(set(start)) < 3 or _is_plain_number(faces[k][3:4]):
-                raise MeshFormatError(f"{path}: face {k} is no triangle")
+        order = sorted(vertices)
+        V = np.array([[float(x) for x in vertices[k][:3]] for k in order]).reshape(len(order), 3)
+        F = _triangles(_records(sections["faces"]), edges, {k: i for i, k in enumerate(order)})
+    except OSError as error:
+        raise MeshFormatError(f"cannot read {file}: {reason(error)}") from error
     except (KeyError, IndexError, ValueError) as error:
-        if isinstance(error, MeshFormatError):
-            raise
-        raise MeshFormatError(f"{path}: no datafile of Surface Evolver ({error!r})") from error
-    fixed = np.array(["fixed" in vertices[k] for k in sorted(vertices)])
-    return V, np.array(F, np.int64).reshape(-1, 3), fixed
+        raise MeshFormatError(f"{file}: not a datafile of Surface Evolver ({error!r})") from error
+    if not np.isfinite(V).all():
+        raise MeshFormatError(f"{file}: a vertex is NaN or infinite")
+    return V, F, np.array(["fixed" in vertices[k] for k in order], np.bool_)
+
+
+def _sections(text: str) -> dict[str, str]:
+    """Text of every section, by its name."""
+    parts = _SECTION.split(_COMMENT.sub(" ", text).replace("\\\n", " "))
+    names = [name.lower().replace("facets", "faces") for name in parts[1::2]]
+    return dict(zip(names, parts[2::2], strict=True))
+
+
+def _triangles(
+    faces: dict[int, list[str]], edges: dict[int, tuple[int, int]], index: dict[int, int]
+) -> IntArray:
+    """Corners of every face: where its three edges start."""
+    F = []
+    for k in sorted(faces):
+        numbers = [int(word) for word in faces[k][:3]]
+        corners = [index[edges[abs(e)][0 if e > 0 else 1]] for e in numbers]
+        if len(set(corners)) < 3 or _is_plain_number(faces[k][3:4]):
+            raise ValueError(f"face {k} is not a triangle")
+        F.append(corners)
+    return np.array(F, np.int64).reshape(-1, 3)
 
 
 def _records(section: str) -> dict[int, list[str]]:
@@ -169,14 +182,15 @@ class EvolverBackend:
         The program is not there.
     """
 
-    def __init__(self, executable: str = "evolver", timeout: float = 120.0) -> None:
-        found = shutil.which(executable)
+    def __init__(self, executable: str | Path = "evolver", timeout: float = 120.0) -> None:
+        name = as_path(executable, "executable")
+        self.timeout = number(timeout, "timeout", above=0.0, unit="seconds")
+        found = shutil.which(name)
         if found is None:
             raise EvolverError(
-                f"{executable} is not installed: apt install evolver-nox, or name its path"
+                f"{name} is not installed: apt install evolver-nox, or name its path"
             )
         self.executable = found
-        self.timeout = positive_number(timeout, "timeout", "seconds")
 
     def __call__(
         self,
@@ -185,34 +199,32 @@ class EvolverBackend:
         *,
         tol: float = 1e-6,
         steps: int | None = None,
-        callback: Callable[..., object] | None = None,
+        callback: StepCallback | None = None,
     ) -> Minimum:
         """Minimise; see `minimize`. ``callback`` is called once, at the end."""
-        tolerance = positive_number(tol, "tol", "no unit")
-        if method not in ("flow", "newton"):
-            raise OptionError(f"method must be one of flow, newton; got {method!r}")
-        count = {"flow": 10, "newton": 8}[method] if steps is None else steps
-        before = problem.with_mesh(restore_volumes(problem)).energy()
-        scripts = [f"g {_GRADIENT_STEPS * count};"]
-        if method == "newton":
-            # A step of scale 0 restores the volumes, which `hessian` expects.
-            newton = "m 0; g;" + " hessian;" * count
-            scripts = [newton, f"g {_WARM_UP}; {newton}", f"g {10 * _GRADIENT_STEPS};"]
-        moved = problem
-        for script in scripts:
-            last = script is scripts[-1]
-            try:
-                moved = problem.with_mesh(self.run(problem, script))
-            except EvolverError:
-                if last:
-                    raise
-                continue
-            if last or moved.energy() <= before + 1e-9 * abs(before):
-                break
+        as_problem(problem)
+        tolerance = number(tol, "tol", above=0.0)
+        choice(method, "method", METHODS)
+        most = _MOST_STEPS[method] if steps is None else count(steps, "steps")
+        if callback is not None:
+            function(callback, "callback")
+        moved = self._lowered(problem, _scripts(method, most))
         result = measured(moved, tolerance, "all steps done")
         if callback is not None:
             callback(1, moved, result.energy, result.residual)
         return result
+
+    def _lowered(self, problem: CapillaryProblem, scripts: list[str]) -> CapillaryProblem:
+        """Run scripts until one does not raise the energy; the last one counts in any case."""
+        before = with_restored_volumes(problem).energy()
+        for script in scripts[:-1]:
+            try:
+                moved = with_surface(problem, self.run(problem, script))
+            except EvolverError:
+                continue
+            if moved.energy() <= before + 1e-9 * abs(before):
+                return moved
+        return with_surface(problem, self.run(problem, scripts[-1]))
 
     def run(self, problem: CapillaryProblem, script: str) -> FloatArray:
         """Run commands on a problem; returns the vertices (n, 3).
@@ -232,7 +244,7 @@ class EvolverBackend:
 
     def run_freely(
         self, problem: CapillaryProblem, script: str
-    ) -> tuple[FloatArray, IntArray, NDArray[np.bool_]]:
+    ) -> tuple[FloatArray, IntArray, BoolArray]:
         """Run commands that may refine or remove triangles; returns what `read_dump` does.
 
         Raises
@@ -240,11 +252,15 @@ class EvolverBackend:
         EvolverError
             As `run`.
         """
+        as_problem(problem)
+        if not text(script, "script").isascii():
+            raise OptionError(f"script must be ASCII; got {script!r}")
         with tempfile.TemporaryDirectory(prefix="remeshvec-") as folder:
             return read_dump(self._run_in(Path(folder), problem, script))
 
     def energy(self, problem: CapillaryProblem) -> float:
         """Return the energy that Surface Evolver computes for a surface as it is, offset included."""
+        as_problem(problem)
         with tempfile.TemporaryDirectory(prefix="remeshvec-") as folder:
             self._run_in(Path(folder), problem, 'printf "%.17g\\n", total_energy >> "energy.txt";')
             text = (Path(folder) / "energy.txt").read_text(encoding="ascii")
@@ -275,3 +291,12 @@ class EvolverBackend:
         if not dump.is_file():
             raise EvolverError(f"Surface Evolver wrote no dump:\n{said}")
         return dump
+
+
+def _scripts(method: str, steps: int) -> list[str]:
+    """Commands to try, in this order, until the energy does not rise."""
+    if method == "flow":
+        return [f"g {_GRADIENT_STEPS * steps};"]
+    # A step of scale 0 restores the volumes, which `hessian` expects.
+    newton = "m 0; g;" + " hessian;" * steps
+    return [newton, f"g {_WARM_UP}; {newton}", f"g {10 * _GRADIENT_STEPS};"]

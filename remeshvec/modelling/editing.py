@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..core.arguments import choice, count
 from ..core.check import as_array, as_mask, as_mesh, which
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
-from .fairing import Polyharmonic
-from .laplacians import Area
+from .fairing import HIGHEST_ORDER, Polyharmonic
+from .laplacians import AREAS, Area
 
-__all__ = ["Editor", "Transform", "as_transform", "deform", "split_vertices"]
+__all__ = ["Editor", "Region", "Transform", "as_transform", "deform"]
 
 Transform = ArrayLike | Callable[[FloatArray], ArrayLike]
 
@@ -92,10 +94,10 @@ class Editor:
         *,
         area: Area = "voronoi",
     ) -> None:
-        vertices, faces = as_mesh(V, F)
-        self.V = vertices.copy()
-        self.handle, self.fixed, self.support = split_vertices(len(vertices), faces, handle, fixed)
-        self._system = Polyharmonic(self.V, faces, self.support, k, area)
+        region = Region.of(V, F, handle, fixed)
+        self.V = region.V
+        self.handle, self.fixed, self.support = region.handle, region.fixed, region.support
+        self._system = region.polyharmonic(self.V, k, area)
         self._basis: FloatArray | None = None
 
     def move(self, transform: Transform) -> FloatArray:
@@ -134,27 +136,44 @@ class Editor:
         return self._basis
 
 
-def split_vertices(
-    n: int, F: NDArray[np.int64], handle: ArrayLike, fixed: ArrayLike
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Masks of handle, fixed part and support; vertices that no face uses count as fixed."""
-    is_handle = as_mask(handle, n, "handle", "vertex")
-    is_fixed = as_mask(fixed, n, "fixed", "vertex")
-    both = np.flatnonzero(is_handle & is_fixed)
-    if len(both):
-        raise OptionError(f"{which(both, 'vertex')} are in the handle and fixed; choose one")
-    if not is_handle.any():
-        raise OptionError("handle is empty: there is nothing to move")
-    is_fixed |= (np.bincount(F.ravel(), minlength=n) == 0) & ~is_handle
-    support = ~(is_handle | is_fixed)
-    if not support.any():
-        raise OptionError("all vertices are in the handle or fixed: none is left to follow")
-    return is_handle, is_fixed, support
+@dataclass(frozen=True)
+class Region:
+    """A mesh whose vertices are in the handle, fixed, or in the support between them."""
+
+    V: FloatArray
+    F: IntArray
+    handle: BoolArray
+    fixed: BoolArray
+    support: BoolArray
+
+    @classmethod
+    def of(cls, V: ArrayLike, F: ArrayLike, handle: ArrayLike, fixed: ArrayLike) -> Region:
+        """Check and copy; vertices that no face uses count as fixed."""
+        vertices, faces = as_mesh(V, F)
+        n = len(vertices)
+        is_handle = as_mask(handle, n, "handle", "vertex")
+        is_fixed = as_mask(fixed, n, "fixed", "vertex")
+        both = np.flatnonzero(is_handle & is_fixed)
+        if len(both):
+            raise OptionError(f"{which(both, 'vertex')} are in the handle and fixed; choose one")
+        if not is_handle.any():
+            raise OptionError("handle is empty: there is nothing to move")
+        is_fixed |= (np.bincount(faces.ravel(), minlength=n) == 0) & ~is_handle
+        support = ~(is_handle | is_fixed)
+        if not support.any():
+            raise OptionError("all vertices are in the handle or fixed: none is left to follow")
+        return cls(vertices.copy(), faces.copy(), is_handle, is_fixed, support)
+
+    def polyharmonic(
+        self, V: FloatArray, k: int, area: Area, length: float | None = None
+    ) -> Polyharmonic:
+        """Return the system of the support, with its vertices at V; checks order and areas."""
+        order = count(k, "k", high=HIGHEST_ORDER)
+        choice(area, "area", AREAS)
+        return Polyharmonic(V, self.F, self.support, order, area, length)
 
 
-def as_transform(
-    transform: Transform, points: FloatArray
-) -> tuple[NDArray[np.float64] | None, FloatArray]:
+def as_transform(transform: Transform, points: FloatArray) -> tuple[FloatArray | None, FloatArray]:
     """Return the affine map (3, 4), if it is one, and where it takes the points."""
     value = transform(points.copy()) if callable(transform) else transform
     array = as_array(value, "transform")

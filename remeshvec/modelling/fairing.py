@@ -6,13 +6,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.check import as_mask, as_mesh, positive_count, which
-from ..core.vocabulary import BoolArray, FloatArray
+from ..core.arguments import choice, count
+from ..core.check import as_mask, as_mesh, which
+from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
-from .laplacians import Area, cotangent_matrix, polyharmonic_matrix, vertex_areas
+from .laplacians import AREAS, Area, cotangent_matrix, polyharmonic_matrix, vertex_areas
 from .solver import LaplacianSolver
 
-__all__ = ["Polyharmonic", "fair"]
+__all__ = ["HIGHEST_ORDER", "Polyharmonic", "fair"]
+
+HIGHEST_ORDER = 3  # of the Laplacian: 1 membrane, 2 thin plate, 3 minimal variation of curvature
 
 
 def fair(
@@ -62,12 +65,14 @@ def fair(
     """
     vertices, faces = as_mesh(V, F)
     free = as_mask(region, len(vertices), "region", "vertex")
-    count = positive_count(iterations, "iterations")
+    order = count(k, "k", high=HIGHEST_ORDER)
+    choice(area, "area", AREAS)
+    solves = count(iterations, "iterations")
     x = vertices.copy()
     if not free.any():
         return x
-    for _ in range(count):
-        x = Polyharmonic(x, faces, free, k, area).solve(x)
+    for _ in range(solves):
+        x = Polyharmonic(x, faces, free, order, area).solve(x)
     return x
 
 
@@ -82,17 +87,13 @@ class Polyharmonic:
     def __init__(
         self,
         V: FloatArray,
-        F: NDArray[np.int64],
+        F: IntArray,
         free: BoolArray,
         k: int,
         area: Area = "voronoi",
         length: float | None = None,
     ) -> None:
-        if k not in (1, 2, 3) or isinstance(k, bool):
-            raise OptionError(
-                f"k must be 1 (membrane), 2 (thin plate) or 3 (minimal variation); got {k!r}"
-            )
-        near = _faces_around(F, free, int(k) - 1)
+        near = _faces_around(F, free, k - 1)
         used = np.zeros(len(V), np.bool_)
         used[F[near]] = True
         lonely = np.flatnonzero(free & ~used)
@@ -103,11 +104,11 @@ class Polyharmonic:
         number[self.vertices] = np.arange(len(self.vertices))
         X, inner = V[self.vertices], number[F[near]]
         areas = vertex_areas(X, inner, area)
-        A = polyharmonic_matrix(cotangent_matrix(X, inner), areas, int(k))
+        A = polyharmonic_matrix(cotangent_matrix(X, inner), areas, k)
         self._pull = np.zeros(len(X))
         if length is not None:
             self._pull = areas
-            A = sp.diags_array(areas) + (-(length**2)) ** int(k) * A
+            A = sp.diags_array(areas) + (-(length**2)) ** k * A
         self._is_free = free[self.vertices]
         self.solver = LaplacianSolver(A, ~self._is_free)
 
@@ -120,7 +121,7 @@ class Polyharmonic:
         return result
 
 
-def _faces_around(F: NDArray[np.int64], vertices: BoolArray, rings: int) -> NDArray[np.intp]:
+def _faces_around(F: IntArray, vertices: BoolArray, rings: int) -> NDArray[np.intp]:
     """Faces that touch some vertices or so many rings around these."""
     reached = vertices.copy()
     for _ in range(rings):

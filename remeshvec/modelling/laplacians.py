@@ -13,9 +13,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.arguments import choice, flag
 from ..core.check import as_mesh, which
 from ..core.vocabulary import FloatArray
-from ..errors import MeshInputError, OptionError
+from ..errors import MeshInputError
 
 __all__ = ["AREAS", "cotangent_matrix", "laplacian", "polyharmonic_matrix", "vertex_areas"]
 
@@ -77,8 +78,7 @@ def vertex_areas(V: ArrayLike, F: ArrayLike, area: Area = "voronoi") -> FloatArr
     """
     import igl
 
-    if area not in AREAS:
-        raise OptionError(f"area must be one of {', '.join(AREAS)}; got {area!r}")
+    choice(area, "area", AREAS)
     vertices, faces = as_mesh(V, F)
     found = igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
     areas = np.zeros(len(vertices))
@@ -121,12 +121,13 @@ def laplacian(
     OptionError
         An area that does not exist.
     """
+    is_symmetric = flag(symmetric, "symmetric")
     areas = vertex_areas(V, F, area)
     C = cotangent_matrix(V, F)
     inverse = _inverse(areas)
     if area == "uniform":
         return sp.csc_array(C * inverse.max())
-    if symmetric:
+    if is_symmetric:
         root = np.sqrt(inverse)
         scaled = C.tocoo()
         data = scaled.data * (root[scaled.row] * root[scaled.col])  # the same both ways

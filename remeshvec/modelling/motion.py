@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import FloatArray, IntArray
 
 __all__ = ["part_of_motion", "rotations_between"]
 
@@ -14,7 +13,7 @@ _NO_TURN = 1e-6
 
 
 def part_of_motion(
-    affine: NDArray[np.float64], centre: FloatArray, points: FloatArray, w: FloatArray
+    affine: FloatArray, centre: FloatArray, points: FloatArray, w: FloatArray
 ) -> FloatArray:
     """Move every point by its own share of an affine map.
 
@@ -56,7 +55,7 @@ def part_of_motion(
     return np.asarray(centre + pivot + turns.apply(away - pivot) + w[:, None] * along)
 
 
-def rotations_between(P: FloatArray, Q: FloatArray, F: NDArray[np.int64]) -> FloatArray:
+def rotations_between(P: FloatArray, Q: FloatArray, F: IntArray) -> FloatArray:
     """Rotation (n, 3, 3) at every vertex from P to Q: the nearest to the mean gradient around it.
 
     Gradients of faces take the unit normal to the unit normal, and count with their area in P.
@@ -75,7 +74,7 @@ def rotations_between(P: FloatArray, Q: FloatArray, F: NDArray[np.int64]) -> Flo
     return np.asarray(U @ Wt)
 
 
-def _frames(X: FloatArray, F: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def _frames(X: FloatArray, F: IntArray) -> tuple[FloatArray, FloatArray]:
     """Two edges and the unit normal of every face as columns; and twice its area."""
     a, b = X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]
     normal = np.cross(a, b)

@@ -16,11 +16,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.check import as_mesh, positive_number
-from ..core.vocabulary import FloatArray, IntArray
+from ..core.arguments import flag, number
+from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..pipeline.remesh import remesh
-from .editing import Transform, as_transform, split_vertices
-from .fairing import Polyharmonic
+from .editing import Region, Transform, as_transform
 from .laplacians import Area
 from .motion import part_of_motion, rotations_between
 
@@ -32,9 +31,9 @@ __all__ = ["EditedSurface", "MultiresolutionEditor"]
 _SHORT, _LONG = 0.5, 1.5
 _SMALL_ANGLE = 28.0
 
-# Times that the base is remeshed in one move: new vertices come to lie beside the triangles that they
-# were made on, where these were long at rest.
-_CORRECTIONS = 4
+# How often the base is remeshed in one move: where triangles were long at rest, new vertices come to lie
+# beside the triangles that they were made on.
+_MOST_REMESHINGS = 4
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class EditedSurface:
     base: FloatArray
     birth_face: IntArray
     birth_barycentric: FloatArray
-    support: NDArray[np.bool_]
+    support: BoolArray
     remeshed: int
 
     def __iter__(self) -> Iterator[NDArray[np.generic]]:
@@ -121,23 +120,25 @@ class MultiresolutionEditor:
         remesh: bool = True,
         area: Area = "voronoi",
     ) -> None:
-        vertices, faces = as_mesh(V, F)
-        self._V, self._F = vertices.copy(), faces.copy()
-        is_handle, is_fixed, support = split_vertices(len(vertices), faces, handle, fixed)
-        self._handle = np.flatnonzero(is_handle)
-        self._remesh = bool(remesh)
+        region = Region.of(V, F, handle, fixed)
+        self._V, self._F = region.V, region.F
+        self._handle = np.flatnonzero(region.handle)
+        self._remesh = flag(remesh, "remesh")
         cutoff = None
         if detail_size is not None:
-            cutoff = positive_number(detail_size, "detail_size", "units of V") / (2.0 * np.pi)
-        self.base = Polyharmonic(self._V, self._F, support, k, area, cutoff).solve(self._V)
+            size = number(detail_size, "detail_size", above=0.0, unit="units of V")
+            cutoff = size / (2.0 * np.pi)
+        if length is None:
+            self._length = _mean_edge_of(self._V[self._F[region.support[self._F].any(axis=1)]])
+        else:
+            self._length = number(length, "length", above=0.0, unit="units of V")
+        self.base = region.polyharmonic(self._V, k, area, cutoff).solve(self._V)
         self.details = self._V - self.base
-        self._length = _mean_edge_of(self._V[self._F[support[self._F].any(axis=1)]])
-        if length is not None:
-            self._length = positive_number(length, "length", "units of V")
-        self._follow = Polyharmonic(self.base, self._F, support, k, area)
-        self._share = self._follow.solve(is_handle[:, None].astype(np.float64))
-        births = _own_births(len(vertices), faces)
-        self._now = _Current(self._F, self._handle, np.flatnonzero(is_fixed), support, *births)
+        self._follow = region.polyharmonic(self.base, k, area)
+        self._share = self._follow.solve(region.handle[:, None].astype(np.float64))
+        fixed_vertices = np.flatnonzero(region.fixed)
+        births = _own_births(len(self._V), self._F)
+        self._now = _Current(self._F, self._handle, fixed_vertices, region.support, *births)
 
     def move(self, *transforms: Transform) -> EditedSurface:
         """Return the surface with its handle moved from where it is at rest.
@@ -156,7 +157,7 @@ class MultiresolutionEditor:
         motion = self._motion(transforms)
         now = self._now
         base = self._placed(now, motion)
-        for _ in range(_CORRECTIONS):
+        for _ in range(_MOST_REMESHINGS):
             if not self._remesh or not self._is_stretched(now, base):
                 break
             now = self._remeshed(now, base)
@@ -260,7 +261,7 @@ class _Current:
     F: IntArray
     handle: NDArray[np.intp]  # in the order at rest
     fixed: NDArray[np.intp]
-    support: NDArray[np.bool_]
+    support: BoolArray
     birth_face: IntArray
     birth_barycentric: FloatArray
     remeshed: int = 0

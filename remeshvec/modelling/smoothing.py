@@ -8,14 +8,18 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.check import as_mask, as_mesh, positive_count, positive_number
-from ..core.vocabulary import FloatArray
+from ..core.arguments import choice, count, flag, number
+from ..core.check import as_mask, as_mesh
+from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
+from ..mesh.edges import components, halfedge_ends
 from ..mesh.repair import count_edges
-from .laplacians import Area, cotangent_matrix, vertex_areas
+from .laplacians import AREAS, Area, cotangent_matrix, vertex_areas
 from .solver import LaplacianSolver
 
 __all__ = ["smooth"]
+
+BOUNDARIES = ("fixed", "free")
 
 
 def smooth(
@@ -67,37 +71,43 @@ def smooth(
         A step that is not positive, other options that do not exist.
     """
     vertices, faces = as_mesh(V, F)
-    n = len(vertices)
     time = _smoothing_step(step, vertices, faces)
-    count = positive_count(iterations, "iterations")
-    if boundary not in ("fixed", "free"):
-        raise OptionError(f"boundary must be one of fixed, free; got {boundary!r}")
-    stays = np.bincount(faces.ravel(), minlength=n) == 0
-    if fixed is not None:
-        stays |= as_mask(fixed, n, "fixed", "vertex")
-    if boundary == "fixed":
-        edges, uses = count_edges(faces)
-        stays[edges[uses == 1]] = True
-    parts = _closed_parts(vertices, faces) if keep_volume else []
-    if keep_volume and stays[faces].any():
-        raise OptionError("keep_volume moves all vertices; it cannot hold some fixed")
+    steps = count(iterations, "iterations")
+    choice(area, "area", AREAS)
+    stays = _staying(len(vertices), faces, choice(boundary, "boundary", BOUNDARIES), fixed)
+    parts = []
+    if flag(keep_volume, "keep_volume"):
+        parts = _closed_parts(vertices, faces)
+        if stays[faces].any():
+            raise OptionError("keep_volume moves all vertices; it cannot hold some fixed")
     x = vertices.copy()
-    for i in range(count):
+    for i in range(steps):
         x = _flow(x, faces, stays, time, area, i)
         for part, volume in parts:
             _restore(x, faces[part], volume)
     return x
 
 
-def _smoothing_step(step: float | None, V: FloatArray, F: NDArray[np.int64]) -> float:
+def _smoothing_step(step: float | None, V: FloatArray, F: IntArray) -> float:
     if step is None:
         T = V[F]
         return float(np.linalg.norm(T - np.roll(T, 1, axis=1), axis=2).mean() ** 2)
-    return positive_number(step, "step", "squared units of V")
+    return number(step, "step", above=0.0, unit="squared units of V")
+
+
+def _staying(n: int, F: IntArray, boundary: str, fixed: ArrayLike | None) -> BoolArray:
+    """Mask of the vertices that do not move, those that no face uses among them."""
+    stays = np.bincount(F.ravel(), minlength=n) == 0
+    if fixed is not None:
+        stays |= as_mask(fixed, n, "fixed", "vertex")
+    if boundary == "fixed":
+        edges, uses = count_edges(F)
+        stays[edges[uses == 1]] = True
+    return stays
 
 
 def _flow(
-    x: FloatArray, F: NDArray[np.int64], stays: NDArray[np.bool_], time: float, area: Area, i: int
+    x: FloatArray, F: IntArray, stays: BoolArray, time: float, area: Area, i: int
 ) -> FloatArray:
     """One implicit step."""
     try:
@@ -114,30 +124,27 @@ def _flow(
     return solved
 
 
-def _closed_parts(V: FloatArray, F: NDArray[np.int64]) -> list[tuple[NDArray[np.intp], float]]:
+def _closed_parts(V: FloatArray, F: IntArray) -> list[tuple[NDArray[np.intp], float]]:
     """Faces and volume of every component."""
-    from scipy.sparse.csgraph import connected_components
-
     n = len(V)
-    start, end = F.ravel(), np.roll(F, -1, axis=1).ravel()
+    start, end = halfedge_ends(F)
     if not np.array_equal(np.sort(start * n + end), np.sort(end * n + start)):
         raise MeshInputError(
             "keep_volume needs a closed surface with faces of one winding; remesh turns them, and "
             'boundary="fixed" keeps an open one from shrinking'
         )
-    graph = sp.csr_array((np.ones(len(start)), (start, end)), (n, n))
-    part = connected_components(graph, directed=False)[1][F[:, 0]]
+    part = components(n, start, end)[1][F[:, 0]]
     order = np.argsort(part, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(part[order])) + 1)
     return [(group, _volume(V, F[group])) for group in groups]
 
 
-def _volume(V: FloatArray, F: NDArray[np.int64]) -> float:
+def _volume(V: FloatArray, F: IntArray) -> float:
     a, b, c = (V[F[:, i]] - V[F[0, 0]] for i in range(3))
     return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0)
 
 
-def _restore(x: FloatArray, F: NDArray[np.int64], volume: float) -> None:
+def _restore(x: FloatArray, F: IntArray, volume: float) -> None:
     """Scale a component, in place, to a volume of the same sign."""
     now = _volume(x, F)
     if volume == 0.0 or not now / volume > 0.0:

@@ -9,9 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.check import as_array, as_mask, which
+from ..core.arguments import choice
+from ..core.check import as_array, as_mask, as_values, which
 from ..core.vocabulary import FloatArray
 from ..errors import MeshInputError, OptionError, SingularSystemError
+from ..mesh.edges import components
 
 __all__ = ["LaplacianSolver"]
 
@@ -70,6 +72,7 @@ class LaplacianSolver:
         fixed: ArrayLike | None = None,
         method: Literal["auto", "cholesky", "cholmod", "lu"] = "auto",
     ) -> None:
+        choice(method, "method", FACTORISATIONS)
         matrix = _as_matrix(A)
         n = matrix.shape[0]
         is_fixed = np.zeros(n, np.bool_)
@@ -102,8 +105,9 @@ class LaplacianSolver:
             As many columns as the right-hand side or the fixed values have.
         """
         n = self.n_free + len(self.fixed)
-        right = None if b is None else _as_columns(b, n, "b")
-        given = None if x_fixed is None else _as_columns(x_fixed, len(self.fixed), "x_fixed")
+        k = len(self.fixed)
+        right = None if b is None else as_values(b, "b", (n,), (n, "c"))
+        given = None if x_fixed is None else as_values(x_fixed, "x_fixed", (k,), (k, "c"))
         shapes = {part.shape[1:] for part in (right, given) if part is not None} or {()}
         if len(shapes) > 1:
             raise OptionError(f"b and x_fixed differ in their columns: {sorted(shapes)}")
@@ -136,37 +140,27 @@ class LaplacianSolver:
 
 
 def _as_matrix(A: Any) -> sp.csc_array:
-    matrix = sp.csc_array(A, dtype=np.float64)
-    if matrix.shape[0] != matrix.shape[1]:
-        raise MeshInputError(f"A must be square, one row a vertex; got shape {matrix.shape}")
+    given = A if sp.issparse(A) else as_array(A, "A")
+    if given.ndim != 2 or given.shape[0] != given.shape[1]:
+        raise MeshInputError(f"A must be square, one row per vertex; got shape {given.shape}")
+    if given.dtype.kind not in "fiu":
+        raise MeshInputError(f"A must hold real numbers; got dtype {given.dtype}")
+    matrix = sp.csc_array(given, dtype=np.float64)
     if not np.isfinite(matrix.data).all():
         bad = np.unique(matrix.tocoo().row[~np.isfinite(matrix.tocoo().data)])
         raise MeshInputError(f"{which(bad, 'row')} of A are NaN or infinite")
     return matrix
 
 
-def _as_columns(value: ArrayLike, n: int, name: str) -> NDArray[np.float64]:
-    array = as_array(value, name)
-    if array.ndim not in (1, 2) or len(array) != n or array.dtype.kind not in "fiub":
-        raise OptionError(
-            f"{name} must have shape ({n},) or ({n}, c); got {array.shape} of {array.dtype}"
-        )
-    if not np.isfinite(array).all():
-        bad = np.flatnonzero(~np.isfinite(array.reshape(n, -1)).all(axis=1))
-        raise OptionError(f"{which(bad, 'row')} of {name} are NaN or infinite")
-    return array.astype(np.float64)
-
-
 def _check_parts(inner: sp.csc_array, across: sp.csr_array, free: NDArray[np.intp]) -> None:
     """Find parts between whose vertices and fixed ones nothing acts, and which constants solve."""
-    from scipy.sparse.csgraph import connected_components
-
     if not len(free):
         return
     size = np.asarray(abs(inner).sum(axis=1) + abs(across).sum(axis=1))
     with np.errstate(invalid="ignore"):
         is_held = np.abs(inner.sum(axis=1)) > _ZERO_SUM * size
-    count, part = connected_components(inner, directed=False)
+    entries = inner.tocoo()
+    count, part = components(len(free), entries.row, entries.col)
     held = np.zeros(count, np.bool_)
     held[part[is_held]] = True
     if held.all():
@@ -180,8 +174,6 @@ def _check_parts(inner: sp.csc_array, across: sp.csr_array, free: NDArray[np.int
 
 
 def _choose(inner: sp.csc_array, method: str) -> str:
-    if method not in FACTORISATIONS:
-        raise OptionError(f"method must be one of {', '.join(FACTORISATIONS)}; got {method!r}")
     if method == "lu" or not inner.shape[0]:
         return method if method != "auto" else "cholesky"
     largest = abs(inner).max()
