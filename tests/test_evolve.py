@@ -80,7 +80,7 @@ def test_held_vertices_are_not_cut():
 def test_other_surfaces_are_left_alone(name):
     V, F = zoo.ZOO[name].make()
     found = cut_necks(V, F, np.zeros(len(V), bool))
-    assert found.n_cuts == 0 and found.F is F
+    assert found.n_cuts == 0 and np.array_equal(found.F, F) and np.array_equal(found.V, V)
 
 
 def test_small_tips_are_no_necks():
