@@ -135,7 +135,7 @@ def _children(pid: int) -> list[str]:
 def _measured(root: Path, repeat: int) -> tuple[dict[int, list[Any]], dict[str, list[float]]]:
     """Run everything so many times, in turns."""
     meshes = [read_mesh(path)[:2] for path in sorted((root / "in").iterdir()) if _is_good(path)]
-    ways = _path_lengths()
+    ways = _ways_to_run()
     commands: dict[int, list[Any]] = {workers: [] for workers in WORKERS}
     calls: dict[str, list[float]] = {name: [] for name in ways}
     for mesh in meshes[:12]:  # loads kernels
@@ -155,7 +155,7 @@ def _is_good(path: Path) -> bool:
     return path.name not in HOSTILE
 
 
-def _path_lengths() -> dict[str, Callable[[list[Any]], Iterable[int]]]:
+def _ways_to_run() -> dict[str, Callable[[list[Any]], Iterable[int]]]:
     def threads(meshes: list[Any]) -> Iterable[int]:
         with ThreadPoolExecutor(2) as executor:
             yield from executor.map(lambda mesh: len(remesh(*mesh).F), meshes)

@@ -239,17 +239,19 @@ def distance_to_mesh(p, V, F) -> float:
     return min(closest_on_triangle(p, *V[list(f)])[1] for f in tuples(F))
 
 
-def ways(tree, start, goal, at, frm, detour, most):
-    """Length of the way from a point over faces to the face of another; the closest face on short ways.
+def path_lengths(tree, start, goal, at, frm, detour, most):
+    """Length of the path from a point over faces to the face of another; closest face on short paths.
 
-    From every face the way goes on through the point of each edge that is closest to the middle between
-    where it came in and the goal.
+    From every face paths go on through the point of each edge that is closest to the middle between where
+    they came in and the goal. They compare in single precision; of equals the first found goes first.
     """
     reach = detour * np.linalg.norm(frm - at)
     waiting, seen = [(0.0, start, frm)], {start}
     best = (np.inf, start)
     while waiting:
-        length, face, entry = waiting.pop(min(range(len(waiting)), key=lambda k: waiting[k][0]))
+        length, face, entry = waiting.pop(
+            min(range(len(waiting)), key=lambda k: np.float32(waiting[k][0]))
+        )
         if face == goal:
             return length + np.linalg.norm(entry - at), best[1]
         corners = tree.corners[face].reshape(3, 3)

@@ -8,6 +8,7 @@ import zoo
 from structure import built, faces_of, referenced, tree_of
 
 from remeshvec.core.compiler import kernel
+from remeshvec.core.geometry import point
 from remeshvec.core.vocabulary import NONE
 from remeshvec.reference.bvh import STACK, closest_face, closest_faces, search_face
 
@@ -18,7 +19,7 @@ RNG = np.random.default_rng(11)
 def query(tree, P, hints, trust, faces, weights, squared):
     stack = np.empty((2, STACK), np.int64)
     for i in range(len(P)):
-        f, s, t, d = closest_face(tree, P[i, 0], P[i, 1], P[i, 2], hints[i], trust, stack)
+        f, s, t, d = closest_face(tree, point(P, i), hints[i], trust, stack)
         faces[i], weights[i, 0], weights[i, 1], squared[i] = f, s, t, d
 
 
@@ -172,9 +173,7 @@ def test_search_and_walk_stay_in_the_patch_of_the_hint(name):
 def search(tree, P, start, N, faces, squared):
     stack = np.empty((2, STACK), np.int64)
     for i in range(len(P)):
-        faces[i], _, _, squared[i] = search_face(
-            tree, P[i, 0], P[i, 1], P[i, 2], start[i], N[i, 0], N[i, 1], N[i, 2], stack
-        )
+        faces[i], _, _, squared[i] = search_face(tree, point(P, i), start[i], point(N, i), stack)
 
 
 @pytest.mark.parametrize("name", ["torus", "thin_sheet", "genus_3", "bipyramid"])

@@ -11,6 +11,7 @@ import zoo
 from structure import built, cut_open, draw, featured, links_of, next_of
 
 from remeshvec.core.compiler import kernel
+from remeshvec.core.geometry import point
 from remeshvec.core.vocabulary import FIXED, NON_MANIFOLD, NONE
 from remeshvec.features.curves import link_chains
 from remeshvec.features.polyline import (
@@ -335,7 +336,7 @@ def test_moves_end_at_the_arc_length(name):
 @kernel
 def query(X, origin, beside, start, P, found, parameter, squared):
     for i in range(len(P)):
-        h, s, d = closest_on_curve(X, origin, beside, start[i], P[i, 0], P[i, 1], P[i, 2])
+        h, s, d = closest_on_curve(X, origin, beside, start[i], point(P, i))
         found[i], parameter[i], squared[i] = h, s, d
 
 

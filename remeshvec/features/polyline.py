@@ -202,7 +202,7 @@ def _may_share(X: FloatArray, ends: IndexArray) -> bool:
 
 
 @inlined
-def closest_on_curve(X, origin, curve_neighbours, start, x, y, z):
+def closest_on_curve(X, origin, curve_neighbours, start, p):
     """Closest point of a curve near edge ``start``: edge, parameter, distance squared.
 
     Searched are the edges within three times the distance to ``start`` along the curve, on both
@@ -211,7 +211,7 @@ def closest_on_curve(X, origin, curve_neighbours, start, x, y, z):
     a = origin[start]
     b = origin[next_halfedge(start)]
     best = start
-    s, distance = closest_on_segment((x, y, z), point(X, a), point(X, b))
+    s, distance = closest_on_segment(p, point(X, a), point(X, b))
     reach = 3.0 * np.sqrt(distance)
     for side in range(2 if curve_neighbours.shape[1] > 0 else 0):
         before = start
@@ -222,7 +222,7 @@ def closest_on_curve(X, origin, curve_neighbours, start, x, y, z):
                 break
             a = origin[h]
             b = origin[next_halfedge(h)]
-            r, d = closest_on_segment((x, y, z), point(X, a), point(X, b))
+            r, d = closest_on_segment(p, point(X, a), point(X, b))
             if d < distance:
                 best, s, distance = h, r, d
             walked += np.sqrt(

@@ -51,7 +51,7 @@ def _measure_gaps(span, mesh, blocks, tree, gaps):
             for v in (a, b, c):
                 if mesh.kind[v] <= HELD:
                     hint = np.int64(mesh.birth[v]) // 3
-            g, s, t, _ = closest_face(tree, x, y, z, hint, 0.0, stack)
+            g, s, t, _ = closest_face(tree, (x, y, z), hint, 0.0, stack)
             qx, qy, qz = point_on_face(tree.corners, g, s, t)
             gap = (qx - x) * nx + (qy - y) * ny + (qz - z) * nz
             gaps[f, 0], gaps[f, 1], gaps[f, 2], gaps[f, 3] = nx, ny, nz, gap

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.compiler import inlined, threaded
-from ..core.geometry import area_vector
+from ..core.geometry import area_vector, point
 from ..core.vocabulary import (
     CURVE,
     DEAD,
@@ -25,7 +25,7 @@ from ..core.vocabulary import (
 from ..features.polyline import closest_on_curve
 from ..mesh.blocks import per_block
 from ..mesh.walk import next_halfedge, previous_halfedge
-from ..reference.bvh import STACK, point_on_face, search_face, walk_to_face
+from ..reference.bvh import NO_NORMAL, STACK, point_on_face, search_face, walk_to_face
 from ..reference.surface import Reference
 
 __all__ = [
@@ -107,11 +107,10 @@ def _project_inner(span, mesh, blocks, tree, trust, before, X, birth):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != INNER:
                 continue
-            x, y, z = before[v, 0], before[v, 1], before[v, 2]
-            f, s, t, d = walk_to_face(tree, x, y, z, np.int64(birth[v]) // 3)
+            at = point(before, v)
+            f, s, t, d = walk_to_face(tree, at, np.int64(birth[v]) // 3)
             if d > trust * before[v, 3] * before[v, 3]:
-                nx, ny, nz = _ring_normal(mesh, before, v)
-                f, s, t, d = search_face(tree, x, y, z, f, nx, ny, nz, stack)
+                f, s, t, d = search_face(tree, at, f, _ring_normal(mesh, before, v), stack)
             birth[v] = 3 * f
             X[v, 0], X[v, 1], X[v, 2] = point_on_face(tree.corners, f, s, t)
 
@@ -141,9 +140,8 @@ def _project_curves(span, mesh, blocks, X_in, origin, curve_neighbours, X, birth
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != CURVE:
                 continue
-            h, s, _ = closest_on_curve(
-                X_in, origin, curve_neighbours, np.int64(birth[v]), X[v, 0], X[v, 1], X[v, 2]
-            )
+            start = np.int64(birth[v])
+            h, s, _ = closest_on_curve(X_in, origin, curve_neighbours, start, point(X, v))
             birth[v] = h
             a = origin[h]
             b = origin[next_halfedge(h)]
@@ -160,12 +158,12 @@ def _locate(
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD:
                 continue
-            x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
+            at = point(mesh.X, v)
             hint = np.int64(birth[v])
             if mesh.kind[v] < CURVE:
-                f, s, t, d = walk_to_face(tree, x, y, z, hint // 3)
+                f, s, t, d = walk_to_face(tree, at, hint // 3)
                 if d > near:
-                    g, gs, gt, gd = search_face(tree, x, y, z, f, 0.0, 0.0, 0.0, stack)
+                    g, gs, gt, gd = search_face(tree, at, f, NO_NORMAL, stack)
                     if d > trust or gd <= near:
                         f, s, t = g, gs, gt
                 birth[v] = 3 * f
@@ -174,7 +172,7 @@ def _locate(
                 barycentric[v, 2] = t
                 continue
             # A fixed vertex lies where its edge starts, and finds itself there.
-            h, s, _ = closest_on_curve(X_in, origin, curve_neighbours, hint, x, y, z)
+            h, s, _ = closest_on_curve(X_in, origin, curve_neighbours, hint, at)
             birth[v] = h
             corner = h - 3 * (h // 3)
             barycentric[v, corner] = 1.0 - s

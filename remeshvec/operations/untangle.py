@@ -243,9 +243,8 @@ def _cost(ring, n, x, y, z, x0, y0, z0, weight, scale, tree, face):
         if not cosine < 1.0:
             return 1e30
         if weight > 0.0:
-            _, _, _, d = walk_to_face(
-                tree, x + (px + qx) / 3.0, y + (py + qy) / 3.0, z + (pz + qz) / 3.0, face
-            )
+            centroid = x + (px + qx) / 3.0, y + (py + qy) / 3.0, z + (pz + qz) / 3.0
+            _, _, _, d = walk_to_face(tree, centroid, face)
             nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
             radius = 0.25 * pp * qq * rr / (nx * nx + ny * ny + nz * nz)
             cosine = max(weight * d, scale * radius)
@@ -294,7 +293,7 @@ def _search(X, birth, v, ring, n, tree, on_surface, limit, weight):
             cx, cy, cz = x + s * sx + t * tx, y + s * sy + t * ty, z + s * sz + t * tz
             f = face
             if on_surface:
-                f, s, t, _ = walk_to_face(tree, cx, cy, cz, face)
+                f, s, t, _ = walk_to_face(tree, (cx, cy, cz), face)
                 cx, cy, cz = point_on_face(tree.corners, f, s, t)
             trial = _cost(ring, n, cx, cy, cz, X[v, 0], X[v, 1], X[v, 2], weight, scale, tree, f)
             if trial < better:

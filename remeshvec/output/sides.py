@@ -7,13 +7,13 @@ sides, and no width.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiler import kernel
-from ..core.geometry import closest_on_segment
+from ..core.compiler import inlined, kernel
+from ..core.geometry import closest_on_segment, point
 from ..core.vocabulary import (
     CURVE,
     DEAD,
@@ -242,14 +242,15 @@ def _vertices_beside(mesh: Mesh, v: IntArray) -> BoolArray:
 def _path_lengths(
     p: Provenance, v: IntArray, w: IndexArray, start: NDArray[Any], face: IndexArray
 ) -> tuple[IndexArray, FloatArray]:
-    """Lengths of ways from vertices ``w``, on faces ``start``, to the faces of vertices ``v``.
+    """Measure paths from vertices ``w``, on faces ``start``, to the faces of vertices ``v``.
 
     Returns
     -------
     near : (k,) int32
-        The face closest to ``v`` among those on short ways.
+        The face closest to ``v`` among those on short paths.
     length : (k,) float64
-        Across no curve, through points of edges half way; inf where it is far.
+        Length of a path that crosses no curve, through a point of every edge on its way; inf where the
+        face is far.
     """
     length, near = np.full(len(v), np.inf), start.astype(np.int32)
     seen = np.zeros(len(p.reference.tree.patch), np.int32)
@@ -257,63 +258,101 @@ def _path_lengths(
     return near, length
 
 
+class _Paths(NamedTuple):
+    """The faces that a search has found, in this order, and the paths to them."""
+
+    face: IntArray  # (k,)
+    entry: FloatArray  # (k, 3), where the path enters the face
+    length: FloatArray  # (k,), up to there
+    # The same in single precision, by which paths compare; equal ones in the order of `face`. Paths to
+    # the faces around a vertex all end there, often, and are equally long but for rounding, which
+    # differs from processor to processor; and the first decides where its neighbours are entered.
+    key: NDArray[np.float32]  # (k,)
+    is_settled: BoolArray  # (k,)
+
+
 @kernel
-def _find_paths(tree, X, vertices, beside, near, face, seen, length):
-    """Settle faces in the order of their ways [Dijkstra 1959]; ``near`` holds the starts."""
-    faces = np.empty(_NEARBY, np.int64)
-    entry = np.empty((_NEARBY, 4))  # the point where the way enters, and its length
-    is_settled = np.empty(_NEARBY, np.bool_)
+def _find_paths(tree, X, vertices, starts, near, goals, seen, length):
+    """Settle faces in the order of their paths [Dijkstra 1959]; ``near`` holds the first faces.
+
+    Unlike there, a face is entered where it was first found, from the nearest of its neighbours.
+    """
+    paths = _Paths(
+        np.empty(_NEARBY, np.int64),
+        np.empty((_NEARBY, 3)),
+        np.empty(_NEARBY),
+        np.empty(_NEARBY, np.float32),
+        np.empty(_NEARBY, np.bool_),
+    )
     for i in range(vertices.size):
         v = vertices[i]
-        x, y, z = X[v, 0], X[v, 1], X[v, 2]
-        for c in range(3):
-            entry[0, c] = X[beside[i], c]
-        entry[0, 3] = 0.0
-        limit = (entry[0, 0] - x) ** 2 + (entry[0, 1] - y) ** 2 + (entry[0, 2] - z) ** 2
-        limit = _DETOUR * np.sqrt(limit)
-        faces[0] = near[i]
-        seen[faces[0]] = i + 1
-        is_settled[0] = False
+        goal = point(X, v)
+        start = point(X, starts[i])
+        limit = _DETOUR * _gap(start, goal)
+        seen[near[i]] = i + 1
+        _add_path(paths, 0, np.int64(near[i]), start, 0.0)
         size = 1
         best = np.inf
         for _ in range(_NEARBY):
-            k = size
-            least = np.inf
-            for j in range(size):
-                if not is_settled[j] and entry[j, 3] < least:
-                    least = entry[j, 3]
-                    k = j
+            k = _shortest(paths, size)
             if k == size:
                 break
-            is_settled[k] = True
-            f = faces[k]
-            if f == face[v]:
-                dx, dy, dz = entry[k, 0] - x, entry[k, 1] - y, entry[k, 2] - z
-                length[i] = entry[k, 3] + np.sqrt(dx * dx + dy * dy + dz * dz)
+            paths.is_settled[k] = True
+            f = paths.face[k]
+            if f == goals[v]:
+                length[i] = paths.length[k] + _gap(point(paths.entry, k), goal)
                 break
-            if entry[k, 3] <= limit:
-                _, _, distance = face_distance(tree.corners, f, x, y, z)
+            if paths.length[k] <= limit:
+                _, _, distance = face_distance(tree.corners, f, goal)
                 if distance < best:
                     best = distance
                     near[i] = f
             for e in range(3):
                 t = np.int64(tree.twin[3 * f + e])
-                if t == NONE or seen[t // 3] == i + 1 or size == _NEARBY:
-                    continue
-                seen[t // 3] = i + 1
-                faces[size] = t // 3
-                a = 3 * e
-                b = 3 * ((e + 1) % 3)
-                px, py, pz = entry[k, 0], entry[k, 1], entry[k, 2]
-                middle = 0.5 * (px + x), 0.5 * (py + y), 0.5 * (pz + z)
-                s, _ = closest_on_segment(
-                    middle, corner(tree.corners, f, e), corner(tree.corners, f, (e + 1) % 3)
-                )
-                squared = 0.0
-                for c in range(3):
-                    start, end = tree.corners[f, a + c], tree.corners[f, b + c]
-                    entry[size, c] = start + s * (end - start)
-                    squared += (entry[size, c] - entry[k, c]) ** 2
-                entry[size, 3] = entry[k, 3] + np.sqrt(squared)
-                is_settled[size] = False
-                size += 1
+                if t != NONE and seen[t // 3] != i + 1 and size < _NEARBY:
+                    seen[t // 3] = i + 1
+                    _extend_path(paths, k, size, tree.corners, e, t // 3, goal)
+                    size += 1
+
+
+@inlined
+def _gap(a, b):
+    """Distance between two points."""
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return np.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@inlined
+def _shortest(paths, size):
+    """Return the shortest of the paths to faces that are not settled, or ``size``."""
+    k = size
+    least = np.float32(np.inf)
+    for j in range(size):
+        if not paths.is_settled[j] and paths.key[j] < least:
+            least = paths.key[j]
+            k = j
+    return k
+
+
+@inlined
+def _extend_path(paths, k, size, corners, e, f, goal):
+    """Continue path ``k`` across edge ``e`` to a face.
+
+    It crosses at the point of the edge that is closest to the middle between its last point and the goal.
+    """
+    last = point(paths.entry, k)
+    a = corner(corners, paths.face[k], e)
+    b = corner(corners, paths.face[k], (e + 1) % 3)
+    middle = 0.5 * (last[0] + goal[0]), 0.5 * (last[1] + goal[1]), 0.5 * (last[2] + goal[2])
+    s, _ = closest_on_segment(middle, a, b)
+    at = a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2])
+    _add_path(paths, size, f, at, paths.length[k] + _gap(at, last))
+
+
+@inlined
+def _add_path(paths, k, f, at, length):
+    paths.face[k] = f
+    paths.entry[k, 0], paths.entry[k, 1], paths.entry[k, 2] = at
+    paths.length[k] = length
+    paths.key[k] = length
+    paths.is_settled[k] = False

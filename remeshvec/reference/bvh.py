@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel, threaded
-from ..core.geometry import closest_on_triangle, face_vector
+from ..core.geometry import closest_on_triangle, face_vector, point
 from ..core.vocabulary import NONE, FloatArray, IndexArray, Tree
 from ..mesh.walk import next_halfedge, previous_halfedge
 
 __all__ = [
+    "NO_NORMAL",
     "STACK",
     "WALK_TRUST",
     "Surface",
@@ -43,6 +44,9 @@ _POINTS = 256  # points that follow each other in one query
 # A walk that ends this close to the point, as a share of the target length, is trusted: the rest of the
 # patch is not searched.
 WALK_TRUST = 0.05
+
+# For `search_face`: every face may be found.
+NO_NORMAL = (0.0, 0.0, 0.0)
 
 STACK = 64  # boxes waiting: 3 a level and 16 levels hold 4e9 leaves
 
@@ -155,8 +159,9 @@ def _fill_level(boxes: FloatArray, below: int, start: int, end: int) -> None:
 
 
 @inlined
-def _box_distance(boxes, i, x, y, z):
+def _box_distance(boxes, i, p):
     """Squared distance from a point to a box."""
+    x, y, z = p
     dx = max(boxes[i, 0] - x, 0.0, x - boxes[i, 3])
     dy = max(boxes[i, 1] - y, 0.0, y - boxes[i, 4])
     dz = max(boxes[i, 2] - z, 0.0, z - boxes[i, 5])
@@ -170,10 +175,10 @@ def corner(corners, f, c):
 
 
 @inlined
-def face_distance(corners, f, x, y, z):
-    """Barycentric weights of corners 1 and 2 of the closest point of a face; squared distance."""
+def face_distance(corners, f, p):
+    """Weights of corners 1 and 2 at the point of a face closest to p; squared distance."""
     a, b, c = corner(corners, f, 0), corner(corners, f, 1), corner(corners, f, 2)
-    return closest_on_triangle((x, y, z), a, b, c)
+    return closest_on_triangle(p, a, b, c)
 
 
 @inlined
@@ -188,14 +193,14 @@ def point_on_face(corners, f, s, t):
 
 
 @inlined
-def walk_to_face(tree, x, y, z, start):
+def walk_to_face(tree, p, start):
     """Go to the closest neighbour until none is closer.
 
     Neighbours are the faces around the edge or corner that holds the closest point. Returns what
     `closest_face` does, for the part of the surface that the walk sees.
     """
     best = start
-    s, t, distance = face_distance(tree.corners, start, x, y, z)
+    s, t, distance = face_distance(tree.corners, start, p)
     for _ in range(_WALK):
         face = best
         on_edge_0 = t == 0.0
@@ -213,7 +218,7 @@ def walk_to_face(tree, x, y, z, start):
             h = np.int64(tree.twin[h])
             if h == NONE:
                 break
-            fs, ft, fd = face_distance(tree.corners, h // 3, x, y, z)
+            fs, ft, fd = face_distance(tree.corners, h // 3, p)
             if fd < distance:
                 best, s, t, distance = h // 3, fs, ft, fd
             if not at_corner:
@@ -225,7 +230,7 @@ def walk_to_face(tree, x, y, z, start):
             # The other way round, for a corner on the boundary.
             h = np.int64(tree.twin[previous_halfedge(3 * face + edge)])
             if h != NONE and h // 3 != face:
-                fs, ft, fd = face_distance(tree.corners, h // 3, x, y, z)
+                fs, ft, fd = face_distance(tree.corners, h // 3, p)
                 if fd < distance:
                     best, s, t, distance = h // 3, fs, ft, fd
         if best == face:
@@ -234,28 +239,28 @@ def walk_to_face(tree, x, y, z, start):
 
 
 @inlined
-def closest_face(tree, x, y, z, hint, trust, stack):
+def closest_face(tree, p, hint, trust, stack):
     """Face of the hint's patch closest to a point, with weights of its corners 1 and 2.
 
     The squared distance comes last. Ties go to the face where the walk from the hint ends. What it
     finds within a squared distance of ``trust`` is taken without a search: 0 for the exact answer,
     inf for the walk alone. ``stack`` is (2, STACK) int64 scratch: boxes waiting and their levels.
     """
-    face, s, t, distance = walk_to_face(tree, x, y, z, hint)
+    face, s, t, distance = walk_to_face(tree, p, hint)
     if distance <= trust:
         return face, s, t, distance
-    return search_face(tree, x, y, z, face, 0.0, 0.0, 0.0, stack)
+    return search_face(tree, p, face, NO_NORMAL, stack)
 
 
 @inlined
-def search_face(tree, x, y, z, face, nx, ny, nz, stack):
+def search_face(tree, p, face, normal, stack):
     """Search the whole patch of a face for the face closest to a point, starting with that face.
 
     With a normal, faces that look the other way do not count, unless the search started there: on a
     thin sheet a point does not go to the other side.
     """
     best = face
-    s, t, distance = face_distance(tree.corners, face, x, y, z)
+    s, t, distance = face_distance(tree.corners, face, p)
     seen = best
     patch = tree.patch[seen]
     top = tree.level.size - 2
@@ -269,14 +274,14 @@ def search_face(tree, x, y, z, face, nx, ny, nz, stack):
         if d == 0:
             for f in range(_LEAF * i, min(_LEAF * i + _LEAF, tree.corners.shape[0])):
                 if f != seen and tree.patch[f] == patch:
-                    fs, ft, fd = face_distance(tree.corners, f, x, y, z)
-                    if fd < distance and not _looks_away(tree.corners, f, nx, ny, nz):
+                    fs, ft, fd = face_distance(tree.corners, f, p)
+                    if fd < distance and not _looks_away(tree.corners, f, normal):
                         best, s, t, distance = f, fs, ft, fd
             continue
         start = tree.level[d - 1]
         end = min(start + _ARITY * i + _ARITY, tree.level[d])
         for j in range(start + _ARITY * i, end):
-            if _box_distance(tree.boxes, j, x, y, z) < distance:
+            if _box_distance(tree.boxes, j, p) < distance:
                 stack[0, size] = j - start
                 stack[1, size] = d - 1
                 size += 1
@@ -284,10 +289,10 @@ def search_face(tree, x, y, z, face, nx, ny, nz, stack):
 
 
 @inlined
-def _looks_away(corners, f, nx, ny, nz):
+def _looks_away(corners, f, normal):
     a, b, c = corner(corners, f, 0), corner(corners, f, 1), corner(corners, f, 2)
-    mx, my, mz = face_vector(a, b, c)
-    return mx * nx + my * ny + mz * nz < 0.0
+    x, y, z = face_vector(a, b, c)
+    return x * normal[0] + y * normal[1] + z * normal[2] < 0.0
 
 
 def closest_faces(
@@ -362,6 +367,6 @@ def _closest_faces(span, tree, points, hint, trust, face, weights, distance):
         for i in range(_POINTS * k, min(_POINTS * k + _POINTS, points.shape[0])):
             start = last if hint[i] == NONE else np.int64(hint[i])
             last, weights[i, 0], weights[i, 1], distance[i] = closest_face(
-                tree, points[i, 0], points[i, 1], points[i, 2], start, trust, stack
+                tree, point(points, i), start, trust, stack
             )
             face[i] = last
