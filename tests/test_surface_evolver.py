@@ -59,6 +59,8 @@ def test_bad_files(tmp_path):
     for text in (
         "", "vertices\n1 0 0 0\nedges\n1 1 2\n", "vertices\n1 0 0 0\nedges\n1 1 9\nfaces\n1 1 1 1\n",
         "vertices\n1 0 0\nedges\n1 1 1\nfaces\n1 1 1 1\n",
+        "vertices\n1 0 0\n2 1 0\n3 0 1\nedges\n1 1 2\n2 2 3\n3 3 1\nfaces\n1 1 2 3\n",
+        "vertices\n1 0 0 0\n2 1 0 0\n3 0 1 nan\nedges\n1 1 2\n2 2 3\n3 3 1\nfaces\n1 1 2 3\n",
     ):  # fmt: skip
         file.write_text(text)
         with pytest.raises(MeshFormatError, match=r"a\.dmp"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -16,10 +15,8 @@ __all__ = [
     "as_indices",
     "as_mask",
     "as_mesh",
-    "as_values",
+    "as_numbers",
     "as_vertices",
-    "positive_count",
-    "positive_number",
     "which",
 ]
 
@@ -103,21 +100,6 @@ def as_faces(F: ArrayLike, n_vertices: int, name: str = "F") -> NDArray[np.int64
     return faces
 
 
-def positive_count(value: Any, name: str) -> int:
-    """Check an option that counts something, at least one."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise OptionError(f"{name} must be a whole number, at least 1; got {value!r}")
-    return int(value)
-
-
-def positive_number(value: Any, name: str, unit: str) -> float:
-    """Check an option that measures something."""
-    is_number = isinstance(value, Real) and not isinstance(value, bool | np.bool_)
-    if not is_number or not np.isfinite(float(value)) or not value > 0.0:
-        raise OptionError(f"{name} must be a positive number, in {unit}; got {value!r}")
-    return float(value)
-
-
 def as_mask(value: Any, count: int, name: str, noun: str) -> NDArray[np.bool_]:
     """Return a new mask of faces or vertices, from a mask or from indices."""
     array = as_array(value, name)
@@ -147,7 +129,7 @@ def as_indices(value: Any, count: int, name: str, noun: str) -> NDArray[np.int64
     return array.astype(np.int64)
 
 
-def as_values(value: Any, name: str, *shapes: tuple[int | str, ...]) -> NDArray[np.float64]:
+def as_numbers(value: Any, name: str, *shapes: tuple[int | str, ...]) -> NDArray[np.float64]:
     """Check finite real numbers of one of several shapes, and cast them to float64; always a copy.
 
     Parameters

@@ -167,8 +167,10 @@ def _as_lengths(value: Iterable[float]) -> tuple[float, ...]:
 
 
 def _as_factors(split: float, collapse: float) -> tuple[float, float]:
-    low = number(collapse, "collapse", low=0.0)
-    return number(split, "split", above=low), low
+    long, short = number(split, "split", above=0.0), number(collapse, "collapse", low=0.0)
+    if short >= long:
+        raise OptionError(f"collapse must be below split; they are {short:g} and {long:g}")
+    return long, short
 
 
 @dataclass(frozen=True)

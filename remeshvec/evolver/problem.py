@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from ..core.arguments import choice, instance, number
-from ..core.check import as_array, as_indices, as_mask, as_mesh, as_values, which
+from ..core.check import as_array, as_indices, as_mask, as_mesh, as_numbers, which
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
 from ..mesh.edges import components, halfedge_ends
@@ -97,7 +97,7 @@ class CapillaryProblem:
         self.volume_offset = number(volume_offset, "volume_offset")
         self.energy_offset = number(energy_offset, "energy_offset")
         self.density = number(density, "density")
-        self.gravity = as_values(gravity, "gravity", (3,))
+        self.gravity = as_numbers(gravity, "gravity", (3,))
         is_apart = choice(bodies, "bodies", VOLUMES) == "per_component"
         if self.volume is not None or self.density:
             _check_winding(self.F)
@@ -142,8 +142,8 @@ class CapillaryProblem:
         self, directions: ArrayLike, pressure: ArrayLike, V: ArrayLike | None = None
     ) -> sp.csr_array:
         """Second derivatives of ``energy - pressure . volumes`` along directions (n, d, 3)."""
-        along = as_values(directions, "directions", (len(self.V), "d", 3))
-        p = as_values(pressure, "pressure", (len(self.targets),))
+        along = as_numbers(directions, "directions", (len(self.V), "d", 3))
+        p = as_numbers(pressure, "pressure", (len(self.targets),))
         return hessian_at(self, self._at(V), along, p)
 
     def with_mesh(
@@ -194,7 +194,7 @@ class CapillaryProblem:
         return with_surface(self, self.V, body=body, targets=targets)
 
     def _at(self, V: ArrayLike | None) -> FloatArray:
-        return self.V if V is None else as_values(V, "V", self.V.shape)
+        return self.V if V is None else as_numbers(V, "V", self.V.shape)
 
 
 def as_problem(value: object) -> CapillaryProblem:

@@ -29,7 +29,7 @@ from .problem import CapillaryProblem, as_problem, with_surface
 __all__ = ["EvolverBackend", "read_dump", "write_fe"]
 
 # Steps at most, where the caller does not say.
-_MOST_STEPS = {"flow": 10, "newton": 8}
+_EVOLVER_STEPS = {"flow": 10, "newton": 8}
 
 # Gradient steps before Newton steps are tried, and those that count as a step of the flow.
 _WARM_UP, _GRADIENT_STEPS = 5, 20
@@ -118,7 +118,7 @@ def read_dump(path: str | Path) -> tuple[FloatArray, IntArray, BoolArray]:
         edges = {k: (int(row[0]), int(row[1])) for k, row in _records(sections["edges"]).items()}
         order = sorted(vertices)
         V = np.array([[float(x) for x in vertices[k][:3]] for k in order]).reshape(len(order), 3)
-        F = _triangles(_records(sections["faces"]), edges, {k: i for i, k in enumerate(order)})
+        F = _corners_of(_records(sections["faces"]), edges, {k: i for i, k in enumerate(order)})
     except OSError as error:
         raise MeshFormatError(f"cannot read {file}: {reason(error)}") from error
     except (KeyError, IndexError, ValueError) as error:
@@ -135,7 +135,7 @@ def _sections(text: str) -> dict[str, str]:
     return dict(zip(names, parts[2::2], strict=True))
 
 
-def _triangles(
+def _corners_of(
     faces: dict[int, list[str]], edges: dict[int, tuple[int, int]], index: dict[int, int]
 ) -> IntArray:
     """Corners of every face: where its three edges start."""
@@ -205,7 +205,7 @@ class EvolverBackend:
         as_problem(problem)
         tolerance = number(tol, "tol", above=0.0)
         choice(method, "method", METHODS)
-        most = _MOST_STEPS[method] if steps is None else count(steps, "steps")
+        most = _EVOLVER_STEPS[method] if steps is None else count(steps, "steps")
         if callback is not None:
             function(callback, "callback")
         moved = self._lowered(problem, _scripts(method, most))

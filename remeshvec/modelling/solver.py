@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.arguments import choice
-from ..core.check import as_array, as_mask, as_values, which
+from ..core.check import as_array, as_mask, as_numbers, which
 from ..core.vocabulary import FloatArray
 from ..errors import MeshInputError, OptionError, SingularSystemError
 from ..mesh.edges import components
@@ -106,8 +106,8 @@ class LaplacianSolver:
         """
         n = self.n_free + len(self.fixed)
         k = len(self.fixed)
-        right = None if b is None else as_values(b, "b", (n,), (n, "c"))
-        given = None if x_fixed is None else as_values(x_fixed, "x_fixed", (k,), (k, "c"))
+        right = None if b is None else as_numbers(b, "b", (n,), (n, "c"))
+        given = None if x_fixed is None else as_numbers(x_fixed, "x_fixed", (k,), (k, "c"))
         shapes = {part.shape[1:] for part in (right, given) if part is not None} or {()}
         if len(shapes) > 1:
             raise OptionError(f"b and x_fixed differ in their columns: {sorted(shapes)}")
