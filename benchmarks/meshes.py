@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from remeshvec import quality
-from remeshvec.files.plain import read_mesh
+from remeshvec.files.mesh_files import read_mesh
 
 from .generate import cut_finer
 

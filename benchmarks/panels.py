@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from remeshvec.files.plain import write_file
+from remeshvec.files.disk import write_file
 from remeshvec.interop.mesh_data import split_vertices
 from remeshvec.viz import pictures, require_viewer
 

@@ -18,7 +18,7 @@ import numpy as np
 from PIL import Image
 
 from remeshvec import Adaptive, remesh
-from remeshvec.files.with_data import read_data
+from remeshvec.files.data_files import read_data
 
 from .films import catenoid, cube, rings, splitting
 from .meshes import load

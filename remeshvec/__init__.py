@@ -15,7 +15,7 @@ from .errors import (
     SingularSystemError,
     WorkerError,
 )
-from .files.plain import MeshFile, read_mesh, write_mesh
+from .files.mesh_files import MeshFile, read_mesh, write_mesh
 from .measures.distance import SurfaceDistance, surface_distance
 from .measures.quality import Quality, quality
 from .output.report import Report

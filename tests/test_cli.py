@@ -15,7 +15,7 @@ import pytest
 import remeshvec
 from remeshvec.cli.command import Progress, main
 from remeshvec.errors import OptionError
-from remeshvec.files.plain import SUFFIXES, read_mesh, write_mesh
+from remeshvec.files.mesh_files import SUFFIXES, read_mesh, write_mesh
 
 SAMPLES = Path(__file__).parents[2] / "shared" / "data" / "samples"
 needs_samples = pytest.mark.skipif(not SAMPLES.is_dir(), reason="the samples are not here")

@@ -8,7 +8,7 @@ import textured
 
 from remeshvec import MeshFormatError, read_mesh
 from remeshvec.batch.one_file import remesh_file
-from remeshvec.files.with_data import read_data, write_data
+from remeshvec.files.data_files import read_data, write_data
 from remeshvec.interop.mesh_data import MeshData
 
 RED_AND_BLUE = np.array([[255, 0, 0], [0, 0, 255]], np.uint8)
@@ -105,7 +105,6 @@ def test_a_bad_texture_index_leaves_the_mesh(tmp_path):
 
 @pytest.mark.parametrize("flat", [True, False])
 def test_ply_keeps_every_property(tmp_path, flat):
-    pytest.importorskip("plyfile")
     source, target = tmp_path / "a.ply", tmp_path / "b.ply"
     data = loaded_cube()
     if flat:
@@ -128,6 +127,104 @@ def test_ply_keeps_every_property(tmp_path, flat):
     assert np.allclose(np.linalg.norm(out.on_vertices["normal"], axis=1), 1)
     if not flat:
         assert_charts(out)
+
+
+@pytest.mark.parametrize("text", [False, True])
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_ply_is_read_as_plyfile_wrote_it(tmp_path, text, order, mixed):
+    plyfile = pytest.importorskip("plyfile")
+    V, F, uv = textured.cube(2)
+    polygons = [row.tolist() for row in F] + [[0, 1, 2, 3]] * mixed
+    texture = [row.ravel() for row in uv] + [np.arange(8.0)] * mixed
+    vertex = np.empty(len(V), [("id", "u2"), ("z", "f8"), ("x", "f8"), ("y", "f8"), ("t", "f4")])
+    vertex["x"], vertex["y"], vertex["z"] = V.T
+    vertex["id"], vertex["t"] = np.arange(len(V)), V[:, 0] / 3
+    # Of a table with lists, plyfile writes scalars of more than a byte in the machine's order.
+    kinds = [("q", "u1"), ("vertex_index", "O"), ("texcoord", "O"), ("group", "i1")]
+    face = np.empty(len(polygons), kinds)
+    face["q"], face["group"] = np.arange(len(polygons)), -(np.arange(len(polygons)) % 3)
+    face["vertex_index"], face["texcoord"] = [
+        np.array([*rows, None], dtype=object)[:-1] for rows in (polygons, texture)
+    ]
+    camera = np.array([(1, 2.5)], [("a", "i4"), ("b", "f8")])
+    tables = [
+        plyfile.PlyElement.describe(camera, "camera"),
+        plyfile.PlyElement.describe(face, "face", val_types={"texcoord": "f8"}),
+        plyfile.PlyElement.describe(vertex, "vertex"),
+    ]
+    plyfile.PlyData(tables, text=text, byte_order=order, comments=["one"]).write(tmp_path / "a.ply")
+    data, notices = read_data(tmp_path / "a.ply")
+    assert len(notices) == mixed
+    row = [*range(len(F)), *[len(F)] * 2 * mixed]
+    assert np.array_equal(data.V, V)
+    assert np.array_equal(data.F, [*F.tolist(), *[[0, 1, 2], [0, 2, 3]] * mixed])
+    assert np.array_equal(data.on_vertices["id"], vertex["id"])
+    assert np.array_equal(data.on_vertices["t"], vertex["t"])
+    assert np.array_equal(data.on_faces["q"], face["q"][row])
+    assert np.array_equal(data.on_faces["group"], face["group"][row])
+    kinds = {name: x.dtype.str for name, x in (data.on_vertices | data.on_faces).items()}
+    assert kinds == {"id": "<u2", "t": "<f4", "q": "|u1", "group": "|i1"}
+    assert np.array_equal(data.on_corners["uv"][: len(F)], uv)
+    if mixed:
+        assert data.on_corners["uv"][-1].tolist() == [[0, 1], [4, 5], [6, 7]]
+    assert data.extra["comments"] == ["one"]
+
+
+def test_ply_is_written_as_plyfile_reads_it(tmp_path):
+    plyfile = pytest.importorskip("plyfile")
+    data = loaded_cube()
+    data.extra["comments"] = ["one", "two"]
+    data.on_vertices["tensor"] = np.arange(4.0 * len(data.V)).reshape(-1, 2, 2)
+    data.on_faces["truth"] = data.F[:, 0] > 9
+    data.on_faces["large"] = np.full(len(data.F), 1 << 40)
+    write_data(tmp_path / "a.ply", data)
+    tables = plyfile.PlyData.read(tmp_path / "a.ply")
+    vertex, face = tables["vertex"], tables["face"]
+    assert tables.comments == ["one", "two"]
+    assert np.array_equal(np.stack([vertex[axis] for axis in "xyz"], axis=1), data.V)
+    assert np.array_equal(np.stack(face["vertex_indices"]), data.F)
+    assert np.array_equal(np.stack(face["texcoord"]), data.on_corners["uv"].reshape(-1, 6))
+    assert np.array_equal(vertex["tensor_2"], data.on_vertices["tensor"][:, 1, 0])
+    assert vertex["red"].dtype == np.uint8 and face["truth"].dtype == np.uint8
+    assert face["large"].dtype == np.float64 and (face["large"] == 1 << 40).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "reason"),
+    [("two words", np.zeros(1), "a blank ends the name"), ("s", np.array(["x"]), "no values of")],
+)
+def test_what_ply_cannot_say_is_named(tmp_path, name, values, reason):
+    data = loaded_cube()
+    data.on_vertices[name] = np.repeat(values, len(data.V))
+    with pytest.raises(MeshFormatError, match=reason):
+        write_data(tmp_path / "a.ply", data)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace(" ", "\t"),
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace(" 3/3", " \\ \r\n 3/3"),
+        lambda text: text.replace("f 1/1 2/2 3/3", "f 1/1 2/2 3/3 # f 1/1"),
+        lambda text: "# a \\\n comment \f \x1c\n" + text,
+        lambda text: text.replace("f 1/1 2/2 3/3", "f -4/-4 -3/-3 -2/-2"),
+        lambda text: text.replace("f 1/1 2/2 3/3", "f 1/1/ 2/2/1 3/3/"),
+    ],
+)
+def test_obj_with_data_has_the_faces_of_the_mesh(tmp_path, change):
+    path = tmp_path / "a.obj"
+    text = (
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+        "usemtl a\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+    )
+    path.write_bytes(change(text).encode())
+    data, _ = read_data(path)
+    assert np.array_equal(data.F, read_mesh(path).F) and data.F.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert data.on_corners["uv"][0].tolist() == [[0, 0], [1, 0], [1, 1]]
+    assert data.on_faces["material"].tolist() == [0, 0]
 
 
 @pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".xdmf", ".msh", ".vtp"])

@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 import random
 import struct
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hostile_files import HOSTILE, LEGAL, OBJ, OFF, F, V, as_json, binary_ply, ply, stl
+from hostile_files import HOSTILE, LEGAL, OBJ, OFF, F, V, as_json, ply, stl
 
 from remeshvec.errors import MeshFormatError
-from remeshvec.files.plain import SUFFIXES, check_writable, read_mesh, write_file, write_mesh
+from remeshvec.files.disk import check_writable, write_file
+from remeshvec.files.mesh_files import SUFFIXES, read_mesh, write_mesh
 
 SAMPLES = Path(__file__).parents[2] / "shared" / "data" / "samples"
 
@@ -64,31 +64,30 @@ def test_quads_of_binary_ply_are_cut(order, tmp_path):
     assert mesh.notices == ["polygons were cut: 2 faces became 4 triangles"]
 
 
-MIXED = [[0, 1, 2], [0, 1, 2, 3]]
+@pytest.mark.parametrize("order", ["little", "big"])
+def test_mixed_polygons_of_binary_ply_are_read(order, tmp_path):
+    mixed = [[0, 1, 2], [0, 1, 2, 3], [3, 2, 1]]
+    (tmp_path / "mixed.ply").write_bytes(ply(f"binary_{order}_endian", faces=mixed))
+    mesh = read_mesh(tmp_path / "mixed.ply")
+    np.testing.assert_array_equal(mesh.F, [[0, 1, 2], [0, 1, 2], [0, 2, 3], [3, 2, 1]])
 
 
-def test_mixed_polygons_of_binary_ply_are_read_by_plyfile(tmp_path):
-    pytest.importorskip("plyfile")
-    (tmp_path / "mixed.ply").write_bytes(binary_ply(faces=MIXED))
-    np.testing.assert_array_equal(
-        read_mesh(tmp_path / "mixed.ply").F, [[0, 1, 2], [0, 1, 2], [0, 2, 3]]
-    )
-
-
-def test_columns_of_ply_in_another_order_are_read_by_plyfile(tmp_path):
-    pytest.importorskip("plyfile")
+def test_columns_of_ply_in_another_order_are_read(tmp_path):
     content = ply().replace(b"double x", b"double w").replace(b"double y", b"double x")
     (tmp_path / "a.ply").write_bytes(content.replace(b"double w", b"double y"))
     np.testing.assert_array_equal(read_mesh(tmp_path / "a.ply").V, V[:, [1, 0, 2]])
 
 
-def test_absence_of_plyfile_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "plyfile", None)
-    (tmp_path / "mixed.ply").write_bytes(binary_ply(faces=MIXED))
-    with pytest.raises(MeshFormatError, match="pip install plyfile"):
-        read_mesh(tmp_path / "mixed.ply")
-    (tmp_path / "plain.ply").write_bytes(binary_ply())
-    assert len(read_mesh(tmp_path / "plain.ply").F) == 4
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".ply"])
+def test_polygons_of_many_corners_are_read(suffix, tmp_path):
+    polygon = [0, 1, 2] * 2000
+    content = {
+        ".obj": OBJ + b"f" + b"".join(b" %d/1/1" % (i + 1) for i in polygon),
+        ".off": OFF.replace(b"4 4 6", b"4 5 6") + b"6000 " + b" ".join(b"%d" % i for i in polygon),
+        ".ply": ply(faces=[*F.tolist(), polygon]),
+    }[suffix]
+    (tmp_path / f"a{suffix}").write_bytes(content)
+    assert len(read_mesh(tmp_path / f"a{suffix}").F) == 4 + 5998
 
 
 def test_random_damage_never_gets_through_wrong(tmp_path, capfd):
@@ -131,7 +130,7 @@ def test_missing_file_folder_and_device(tmp_path):
 
 
 def test_file_beyond_the_size_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr("remeshvec.files.guards.MAX_BYTES", 10)
+    monkeypatch.setattr("remeshvec.files.disk.MAX_BYTES", 10)
     (tmp_path / "a.obj").write_bytes(OBJ)
     with pytest.raises(MeshFormatError, match="the limit is 10"):
         read_mesh(tmp_path / "a.obj")

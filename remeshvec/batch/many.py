@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ..core import arguments
 from ..core.threads import available_threads
 from ..errors import BatchError, OptionError
-from ..files.plain import MeshFile, read_mesh
+from ..files.mesh_files import MeshFile, read_mesh
 from ..input.options import OPTION_NAMES, RemeshKeywords
 from ..output.result import RemeshResult
 from ..pipeline.job import Lengths

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..core import arguments
-from ..files.plain import PATHS
-from ..files.with_data import check_data_writable, read_data, write_data
+from ..files.data_files import check_data_writable, read_data, write_data
+from ..files.disk import FilePath
 from ..input.options import RemeshKeywords
 from ..interop.mesh_data import MeshData, carry
 from ..output.result import RemeshResult
@@ -19,7 +19,7 @@ __all__ = ["remesh_file", "with_feature_data"]
 
 
 def remesh_file(
-    source: PATHS, target: PATHS, L: Any = None, **options: Unpack[RemeshKeywords]
+    source: FilePath, target: FilePath, L: Any = None, **options: Unpack[RemeshKeywords]
 ) -> RemeshResult:
     """Remesh a file with its colours, texture coordinates, fields and groups, where formats hold them.
 

@@ -9,8 +9,8 @@ from typing import Any, get_args
 from ..core.version import __version__
 from ..core.vocabulary import DEFAULT_LENGTH_FACTOR
 from ..errors import OptionError
-from ..files.plain import MeshFile
-from ..files.with_data import COMMON_SUFFIXES
+from ..files.data_files import COMMON_SUFFIXES
+from ..files.mesh_files import MeshFile
 from ..input.options import OPTION_NAMES, Boundary, Preset
 from ..measures.quality import quality
 from ..sizing.adaptive import Adaptive

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshFormatError
-from ..files.plain import write_file
+from ..files.disk import write_file
 from ..output.result import RemeshResult
 
 __all__ = ["read_array", "write_arrays"]

@@ -20,8 +20,9 @@ from ..batch.one_file import with_feature_data
 from ..batch.progress import bar
 from ..core.threads import available_threads
 from ..errors import MeshFormatError, OptionError
-from ..files.plain import MeshFile, check_writable, write_file
-from ..files.with_data import check_data_writable, read_data, write_data
+from ..files.data_files import check_data_writable, read_data, write_data
+from ..files.disk import check_writable, write_file
+from ..files.mesh_files import MeshFile
 from ..interop.mesh_data import carry
 from ..processes.pool import run_here, run_in_processes
 from .arguments import batch_parser, given_options, target_length

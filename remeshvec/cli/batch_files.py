@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import OptionError
-from ..files.with_data import COMMON_SUFFIXES
+from ..files.data_files import COMMON_SUFFIXES
 
 __all__ = ["FileJob", "find_jobs", "refuse_collisions"]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import MeshFormatError, OptionError
-from ..files.plain import write_file
+from ..files.disk import write_file
 
 __all__ = ["COLUMNS", "MEASURES", "Table", "write_parquet"]
 

@@ -18,8 +18,9 @@ import remeshvec
 
 from ..batch.one_file import with_feature_data
 from ..errors import OptionError, RemeshvecError
-from ..files.plain import MeshFile, check_writable, write_file
-from ..files.with_data import check_data_writable, read_data, write_data
+from ..files.data_files import check_data_writable, read_data, write_data
+from ..files.disk import check_writable, write_file
+from ..files.mesh_files import MeshFile
 from ..interop.mesh_data import carry
 from ..measures.quality import side_by_side
 from ..output.result import RemeshResult

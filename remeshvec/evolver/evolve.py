@@ -11,7 +11,8 @@ from typing import Any, Literal
 from ..core.arguments import choice, count, flag, function, instance, items, number, path
 from ..core.vocabulary import FloatArray, IntArray
 from ..errors import MeshFormatError, OptionError
-from ..files.plain import reason, write_mesh
+from ..files.disk import reason
+from ..files.mesh_files import write_mesh
 from .minimize import Minimum, minimize, unmoved, with_restored_volumes
 from .problem import VOLUMES, CapillaryProblem, as_problem
 from .reshape import remeshed, with_cut_necks, without_crumbs

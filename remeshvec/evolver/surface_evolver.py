@@ -20,7 +20,7 @@ from ..core.arguments import choice, count, function, number, text
 from ..core.arguments import path as as_path
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshFormatError, OptionError
-from ..files.plain import reason, write_file
+from ..files.disk import reason, write_file
 from ..mesh.edges import halfedge_ends
 from .errors import EvolverError
 from .minimize import METHODS, Minimum, StepCallback, measured, with_restored_volumes

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, cast
 from ..core import arguments
 from ..core.version import __version__
 from ..errors import OptionError, RemeshvecError
-from ..files.plain import check_writable, write_file
+from ..files.disk import check_writable, write_file
 from ..measures.quality import Quality, elements
 from ..viz.pictures import UP
 from .charts import build_charts

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshInputError
+from ..mesh.polygons import fan_triangles
 from .mesh_data import Data, MeshData
 
 __all__ = ["is_meshio", "read_meshio", "write_meshio"]
@@ -39,9 +40,7 @@ def read_meshio(mesh: Any) -> MeshData:
     _check_blocks(mesh, blocks)
     F, cell, source = [], [], []
     for i, block in blocks:
-        faces, of = _triangles(
-            np.asarray(block.data, dtype=object if block.type == "polygon" else None)
-        )
+        faces, of = _triangles(block.data)
         F.append(faces)
         cell.append(of)
         source.append(np.full(len(faces), i))
@@ -79,17 +78,12 @@ def _check_blocks(mesh: Any, blocks: list[Any]) -> None:
         warnings.warn(f"{', '.join(sorted(left_out))} are not remeshed and left out", stacklevel=6)
 
 
-def _triangles(cells: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cut cells into fans; returns the triangles and the cell of each."""
-    if cells.dtype != object and cells.shape[1] == 3:
-        return cells.astype(np.int64), np.arange(len(cells))
-    fans = [
-        (polygon[0], polygon[k], polygon[k + 1], i)
-        for i, polygon in enumerate(cells)
-        for k in range(1, len(polygon) - 1)
-    ]
-    table = np.array(fans, dtype=np.int64).reshape(-1, 4)
-    return table[:, :3], table[:, 3]
+def _triangles(cells: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Cut the cells of a block into triangles; returns also the cell of each."""
+    if isinstance(cells, np.ndarray) and cells.ndim == 2:
+        return fan_triangles(cells.ravel(), np.full(len(cells), cells.shape[1]))
+    sizes = np.array([len(cell) for cell in cells], np.int64)
+    return fan_triangles(np.concatenate([np.empty(0, np.int64), *cells]), sizes)
 
 
 def _to_meshio(mesh: Any, is_plane: bool, data: MeshData) -> Any:

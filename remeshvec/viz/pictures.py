@@ -19,7 +19,7 @@ from ..core import arguments
 from ..core.check import as_array, as_mesh
 from ..core.vocabulary import FloatArray, IntArray
 from ..errors import OptionError, RemeshvecError
-from ..files.plain import check_writable, write_file
+from ..files.disk import check_writable, write_file
 
 __all__ = [
     "PICTURE_SUFFIXES",

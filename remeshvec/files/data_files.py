@@ -1,0 +1,125 @@
+"""Files with all that they carry: read, remeshed, written.
+
+OBJ and PLY files are read here with what they hold besides a mesh; OFF, STL and JSON hold a mesh
+alone. All other formats are those of meshio, pyvista and trimesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..core import arguments
+from ..core.check import as_mesh
+from ..errors import MeshFormatError
+from ..interop.mesh_data import MeshData
+from .disk import (
+    FilePath,
+    check_regular,
+    check_writable,
+    checked_bytes,
+    named_errors,
+    reason,
+    write_file,
+)
+from .foreign import can_write, read_foreign, write_foreign
+from .mesh_files import SUFFIXES, read_mesh, write_mesh
+from .obj import OBJ_DATA, ObjFile, obj_bytes
+from .ply import PlyFile, ply_bytes
+from .polygon_mesh import check_polygons, triangulated
+
+__all__ = [
+    "COMMON_SUFFIXES",
+    "check_data_writable",
+    "read_data",
+    "write_data",
+]
+
+# What patterns look for; files of other suffixes are read if they are named.
+COMMON_SUFFIXES = (*SUFFIXES, ".vtk", ".vtu", ".vtp", ".msh", ".xdmf", ".glb", ".gltf")
+
+
+def read_data(path: FilePath) -> tuple[MeshData, list[str]]:
+    """Read a mesh with what it carries, and notices of what the reader did.
+
+    Raises
+    ------
+    MeshFormatError
+        The file cannot be read as what its suffix says, or holds no valid mesh.
+    OptionError
+        ``path`` is not a path.
+    """
+    path = Path(arguments.path(path, "path"))
+    suffix = path.suffix.lower()
+    with named_errors("read", path):
+        if suffix == ".obj":
+            return _read_own(ObjFile(checked_bytes(path)), path)
+        if suffix == ".ply":
+            return _read_own(PlyFile(checked_bytes(path)), path)
+        if suffix not in SUFFIXES:
+            check_regular(path)
+            data, notices = read_foreign(path)
+            as_mesh(data.V, data.F)
+            return data, notices
+    V, F, notices = read_mesh(path)
+    return MeshData(V, F), notices
+
+
+def _read_own(file: ObjFile | PlyFile, path: Path) -> tuple[MeshData, list[str]]:
+    """Read a mesh with what it carries; the mesh alone, with a notice, if only that is valid."""
+    mesh = file.mesh()
+    check_polygons(mesh)
+    triangles = triangulated(mesh)
+    try:
+        return file.data(mesh.V, triangles, path.parent), triangles.notices
+    except ValueError as error:
+        notice = f"only the mesh was read, not what it carries: {reason(error)}"
+        return MeshData(mesh.V, triangles.F), [*triangles.notices, notice]
+
+
+def check_data_writable(path: FilePath, suffixes: Sequence[str] = ()) -> None:
+    """Refuse a path that `write_data` could not write, before long work is done for it.
+
+    Raises
+    ------
+    MeshFormatError
+    OptionError
+        ``path`` is not a path.
+    """
+    suffix = Path(arguments.path(path, "path")).suffix.lower()
+    check_writable(path, suffixes)
+    obstacle = None if suffix in SUFFIXES else can_write(suffix)
+    if obstacle:
+        raise MeshFormatError(f"cannot write {path}: {obstacle}")
+
+
+def write_data(path: FilePath, data: MeshData) -> list[str]:
+    """Write a mesh with what it carries, as far as the format can hold it.
+
+    Returns
+    -------
+    list of str
+        Names of data that the format cannot hold.
+
+    Raises
+    ------
+    MeshFormatError
+        The file cannot be written; one of that name stays as it is.
+    OptionError
+        ``path`` is not a path.
+    """
+    path = Path(arguments.path(path, "path"))
+    suffix = path.suffix.lower()
+    carried = {*data.on_vertices, *data.on_faces, *data.on_corners}
+    if suffix in SUFFIXES and (suffix not in (".obj", ".ply") or not carried):
+        write_mesh(path, data.V, data.F)
+        return sorted(carried)
+    with named_errors("write", path):
+        if suffix == ".obj":
+            content, held = obj_bytes(data, path), {*OBJ_DATA}
+        elif suffix == ".ply":
+            content, held = ply_bytes(data), carried - (set(data.on_corners) - {"uv"})
+        else:
+            content, held = write_foreign(path, data)
+    write_file(path, content)
+    return sorted(carried - held)

@@ -1,0 +1,176 @@
+"""Whole files: looked at before they are read, written completely or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import secrets
+import shutil
+import stat
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..core import arguments
+from ..errors import MeshFormatError
+
+__all__ = [
+    "FilePath",
+    "check_regular",
+    "check_writable",
+    "checked_bytes",
+    "named_errors",
+    "reason",
+    "write_file",
+]
+
+FilePath = str | os.PathLike[str]
+
+# The whole file is held in memory, and its numbers beside it.
+MAX_BYTES = 4 << 30
+
+
+@contextmanager
+def named_errors(action: str, path: Path) -> Iterator[None]:
+    """Turn errors of any kind into one that names the file and the reason.
+
+    Raises
+    ------
+    MeshFormatError
+    """
+    try:
+        yield
+    except Exception as error:  # of whatever kind: libraries raise all sorts on a broken file
+        raise MeshFormatError(f"cannot {action} {path}: {reason(error)}") from error
+
+
+def reason(error: Exception) -> str:
+    """Say in one line what went wrong."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory"
+    if isinstance(error, json.JSONDecodeError):
+        return f"it is not JSON: {error}"
+    if isinstance(error, UnicodeDecodeError):
+        return "it is not UTF-8"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def check_regular(path: Path) -> None:
+    """Refuse a path where no regular file is.
+
+    Raises
+    ------
+    ValueError
+    """
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        raise ValueError("there is no such file") from None
+    if stat.S_ISDIR(mode):
+        raise ValueError("it is a folder")
+    if not stat.S_ISREG(mode):
+        raise ValueError("it is not a regular file")
+
+
+def checked_bytes(path: Path) -> bytes:
+    """Return the content of a file that is there, regular, of bearable size, and what it claims.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, empty, not a regular file, too large, compressed, or of another format
+        than its suffix says.
+    """
+    check_regular(path)
+    size = path.stat().st_size
+    if size > MAX_BYTES:
+        raise ValueError(f"it has {size:,} bytes; the limit is {MAX_BYTES:,}")
+    data = path.read_bytes()
+    if not data.strip():
+        raise ValueError("it is empty")
+    _check_suffix(data, path.suffix.lower())
+    return data
+
+
+def _check_suffix(data: bytes, suffix: str) -> None:
+    """Refuse content that plainly is something else than the suffix says."""
+    if data[:2] == b"\x1f\x8b" or data[:4] == b"PK\x03\x04":
+        raise ValueError("it is compressed; unpack it first")
+    found = _format_of(data)
+    if found and found != suffix and not (suffix == ".stl" and b"\0" in data):
+        raise ValueError(f"the content is {found[1:].upper()}, not {suffix[1:].upper()}")
+    if suffix == ".ply" and found != ".ply":
+        raise ValueError("it does not start with 'ply'")
+
+
+def _format_of(data: bytes) -> str | None:
+    """Return the suffix of a format that names itself in its first bytes."""
+    head = data[:512].removeprefix(b"\xef\xbb\xbf").lstrip()
+    if re.match(rb"ply[ \t]*\r?\n", head):
+        return ".ply"
+    if re.match(rb"(?:ST)?C?N?OFF\s", head):
+        return ".off"
+    if re.match(rb"solid\b[^\r\n]*[\r\n]+\s*facet\b", head, re.IGNORECASE):
+        return ".stl"
+    return ".json" if head[:1] == b"{" else None
+
+
+def write_file(path: FilePath, content: bytes) -> None:
+    """Write a file under another name beside it, then rename: nobody sees a half-written file.
+
+    Raises
+    ------
+    MeshFormatError
+        The file cannot be written.
+    """
+    with named_errors("write", Path(arguments.path(path, "path"))):
+        target = Path(path).resolve()  # a link stays a link
+        part = target.with_name(f".{secrets.token_hex(8)}.part")
+        try:
+            with open(part, "xb") as file:
+                file.write(content)
+            if target.exists():
+                shutil.copymode(target, part)
+            os.replace(part, target)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+
+
+def check_writable(path: FilePath, suffixes: Sequence[str] = ()) -> None:
+    """Refuse a path that cannot be written, before long work is done for it.
+
+    Parameters
+    ----------
+    path : str or path
+        The file to be.
+    suffixes : sequence of str
+        Allowed suffixes, in lower case; empty for any.
+
+    Raises
+    ------
+    MeshFormatError
+        The suffix is not allowed, the folder is not there or cannot be written to, or a folder has
+        this name.
+    """
+    with named_errors("write", Path(arguments.path(path, "path"))):
+        obstacle = _obstacle(Path(path).resolve(), suffixes)
+        if obstacle:
+            raise ValueError(obstacle)
+
+
+def _obstacle(target: Path, suffixes: Sequence[str]) -> str | None:
+    if suffixes and target.suffix.lower() not in suffixes:
+        return f"the suffix {target.suffix!r} is none of {', '.join(suffixes)}"
+    if not target.parent.is_dir():
+        return f"there is no folder {target.parent}"
+    if target.is_dir():
+        return "it is a folder"
+    if target.exists() and not target.is_file():
+        return "it is not a regular file"
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        return f"the folder {target.parent} cannot be written to"
+    return None

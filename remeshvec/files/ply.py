@@ -1,0 +1,210 @@
+"""PLY files: ASCII and binary of both byte orders, with any properties of vertices and faces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..interop.mesh_data import Data, MeshData
+from ..mesh.polygons import fan_triangles
+from .ply_header import TYPE_NAMES, parse_header
+from .ply_tables import Table, read_tables
+from .polygon_mesh import PolygonMesh, Triangles
+from .text import floats, shown
+
+__all__ = ["PlyFile", "ply_bytes"]
+
+# Properties that belong together, in the order of their names: what they go by here.
+_COLOURS = [("red", "green", "blue", "alpha"), ("red", "green", "blue")]
+_VECTORS: dict[str, list[tuple[str, ...]]] = {
+    "color": _COLOURS,
+    "normal": [("nx", "ny", "nz")],
+    "uv": [("s", "t"), ("u", "v"), ("texture_u", "texture_v")],
+}
+_INDEX_LISTS = ("vertex_indices", "vertex_index")
+_FEATURES = ("uv", "texnumber", "material_index")
+
+
+class PlyFile:
+    """The tables of vertices and faces in a PLY file.
+
+    Raises
+    ------
+    ValueError
+        The header cannot be understood, lacks vertices or faces, or promises more than the file
+        holds; or a row does not fit the header.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        self._header = parse_header(content)
+        scalars = {p.name for p in self._header.element("vertex").properties if p.length is None}
+        if not {"x", "y", "z"} <= scalars:
+            raise ValueError("its vertices lack x, y or z")
+        lists = {p.name for p in self._header.element("face").properties if p.length is not None}
+        names = [name for name in _INDEX_LISTS if name in lists]
+        if not names:
+            raise ValueError("its faces lack the list 'vertex_indices'")
+        tables = read_tables(content, self._header)
+        self._vertices, self._faces = tables["vertex"], tables["face"]
+        self._indices = names[0]
+
+    def mesh(self) -> PolygonMesh:
+        """Return the vertices and polygons."""
+        axes = [_numbers(self._vertices.scalars[axis], axis) for axis in "xyz"]
+        indices, sizes = self._faces.lists[self._indices]
+        return PolygonMesh(
+            np.stack(axes, axis=1).astype(np.float64, copy=False),
+            _cast(_numbers(indices, self._indices), np.int64, self._indices),
+            sizes,
+            [],
+        )
+
+    def data(self, V: NDArray[Any], triangles: Triangles, _: Path) -> MeshData:
+        """Return the mesh with all other properties of its vertices and faces.
+
+        Raises
+        ------
+        ValueError
+            A value is not of the type that the header tells.
+        """
+        data = MeshData(V, triangles.F)
+        vertex = self._columns("vertex", self._vertices)
+        _group(vertex, data.on_vertices, data.extra)
+        _group(self._columns("face", self._faces), data.on_faces, {})
+        data.on_faces = {name: x[triangles.polygon] for name, x in data.on_faces.items()}
+        uv = self._texture_coordinates()
+        if uv is not None:
+            data.on_corners["uv"] = uv
+        names = [*data.on_vertices, *data.on_faces, *data.on_corners]
+        data.feature_data = tuple(name for name in _FEATURES if name in names)
+        data.directions = ("normal",) if "normal" in data.on_vertices else ()
+        if names:
+            data.extra["comments"] = self._header.comments
+        return data
+
+    def _columns(self, element: str, table: Table) -> Data:
+        """Return the columns of a table besides coordinates, in the types of the header."""
+        return {
+            p.name: _cast(_numbers(table.scalars[p.name], p.name), p.dtype, p.name)
+            for p in self._header.element(element).properties
+            if p.name in table.scalars and p.name not in ("x", "y", "z")
+        }
+
+    def _texture_coordinates(self) -> NDArray[np.float64] | None:
+        """Return texture coordinates (t, 3, 2) of triangles, None unless all corners have them."""
+        values, counts = self._faces.lists.get("texcoord", ((), ()))
+        sizes = self._faces.lists[self._indices][1]
+        if not np.array_equal(counts, 2 * sizes):
+            return None
+        uv = _numbers(values, "texcoord").astype(np.float64).reshape(-1, 2)
+        return uv[fan_triangles(np.arange(len(uv)), sizes)[0]]
+
+
+def _numbers(values: Any, name: str) -> NDArray[Any]:
+    """Return a column as numbers: NaN and infinite ones count as such here."""
+    if not isinstance(values, list):
+        return np.asarray(values)
+    numbers = floats(b" ".join(values))
+    return np.array([_number(word, name) for word in values]) if numbers is None else numbers
+
+
+def _number(word: bytes, name: str) -> float:
+    try:
+        return float(word.replace(b"_", b"?"))  # Python takes 1_000 for a number
+    except ValueError:
+        raise ValueError(f"{shown(word)} in the column {name!r} is not a number") from None
+
+
+def _cast(values: NDArray[Any], dtype: Any, name: str) -> NDArray[Any]:
+    """Return values in the type that the header tells, in which they must fit."""
+    kind = np.dtype(dtype)
+    with np.errstate(invalid="ignore", over="ignore"):
+        cast = values.astype(kind)
+    if kind.kind in "iu" and not np.array_equal(cast, values):
+        raise ValueError(f"the column {name!r} holds something else than integers of its type")
+    return cast
+
+
+def _group(columns: Data, into: Data, extra: dict[str, Any]) -> None:
+    """Put columns that belong together into one array, and note which they were."""
+    rest = dict(columns)
+    for name, choices in _VECTORS.items():
+        for choice in choices:
+            if set(choice) <= set(rest):
+                into[name] = np.stack([rest.pop(column) for column in choice], axis=1)
+                extra[f"columns:{name}"] = choice
+                break
+    into |= rest
+
+
+def ply_bytes(data: MeshData) -> bytes:
+    """Write a mesh with all data on vertices and faces, and texture coordinates on corners, binary."""
+    vertex = {axis: data.V[:, i] for i, axis in enumerate("xyz")}
+    vertex |= _scalars(data.on_vertices, data.extra)
+    lists = {"vertex_indices": data.F.astype(np.int32)}
+    if "uv" in data.on_corners:
+        lists["texcoord"] = data.on_corners["uv"].reshape(len(data.F), 6).astype(np.float64)
+    comments = [f"comment {line}" for line in data.extra.get("comments", [])]
+    tables = [
+        _written("vertex", vertex, {}, len(data.V)),
+        _written("face", _scalars(data.on_faces, {}), lists, len(data.F)),
+    ]
+    lines = ["ply", "format binary_little_endian 1.0", *comments]
+    header = "\n".join([*lines, *(line for head, _ in tables for line in head), "end_header\n"])
+    return header.encode() + b"".join(rows for _, rows in tables)
+
+
+def _written(name: str, scalars: Data, lists: Data, count: int) -> tuple[list[str], bytes]:
+    """Return the lines of the header and the rows of a table, lists first."""
+    head, fields = [f"element {name} {count}"], []
+    for column, values in lists.items():
+        head.append(f"property list uchar {TYPE_NAMES[values.dtype.str[1:]]} {column}")
+        kind = values.dtype.newbyteorder("<")
+        fields += [(f"length of {column}", "u1"), (column, kind, values.shape[1:])]
+    for column, values in scalars.items():
+        if len(column.split()) != 1:
+            raise ValueError(f"PLY holds no column named {column!r}: a blank ends the name")
+        head.append(f"property {TYPE_NAMES[values.dtype.str[1:]]} {column}")
+        fields.append((column, values.dtype.newbyteorder("<")))
+    rows = np.empty(count, fields)
+    for column, values in lists.items():
+        rows[f"length of {column}"] = values.shape[1]
+    for column, values in {**lists, **scalars}.items():
+        rows[column] = values
+    return head, rows.tobytes()
+
+
+def _scalars(data: Data, extra: dict[str, Any]) -> Data:
+    """Return columns of one number each."""
+    columns: Data = {}
+    for name, values in data.items():
+        values = _storable(values, name)
+        if values.ndim == 1:
+            columns[name] = values
+            continue
+        flat = values.reshape(len(values), -1)
+        names = extra.get(f"columns:{name}") or _property_names(name, flat.shape[1])
+        columns |= {column: flat[:, i] for i, column in enumerate(names)}
+    return columns
+
+
+def _property_names(name: str, count: int) -> tuple[str, ...]:
+    for choice in _VECTORS.get(name, []):
+        if len(choice) == count:
+            return choice
+    return tuple(f"{name}_{i}" for i in range(count))
+
+
+def _storable(values: NDArray[Any], name: str) -> NDArray[Any]:
+    """Return values in a type that PLY knows: no integers beyond 32 bits, and no truth values."""
+    if values.dtype.kind == "b":
+        return values.astype(np.uint8)
+    if values.dtype.kind in "iu" and values.dtype.itemsize == 8:
+        low, high = (values.min(), values.max()) if values.size else (0, 0)
+        return values.astype(np.float64 if low < -(2**31) or high >= 2**31 else np.int32)
+    if values.dtype.str[1:] not in TYPE_NAMES:
+        raise ValueError(f"PLY holds no values of type {values.dtype}, as {name!r} has")
+    return values
