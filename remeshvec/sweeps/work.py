@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 
 from ..core.vocabulary import DEAD, FloatArray, Mesh
@@ -79,10 +81,9 @@ class Work:
 
     def trial(self) -> Work:
         """Copy the work: what happens to the copy does not touch this one."""
-        copy = Work.__new__(Work)
-        copy.__dict__.update(self.__dict__)
-        copy.mesh, copy.keeps_numbers = self.mesh.copy(), True
-        return copy
+        trial = copy(self)
+        trial.mesh, trial.keeps_numbers = self.mesh.copy(), True
+        return trial
 
     def adopt(self, trial: Work) -> None:
         """Go on with what became of a trial."""
