@@ -1,4 +1,4 @@
-"""Exceptions, named by meaning; every one says what is wrong, where, and what to do."""
+"""Exceptions, named by meaning; each message says what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -26,11 +26,14 @@ class OptionError(RemeshvecError, ValueError):
 
 
 class MeshFormatError(RemeshvecError, ValueError):
-    """A mesh file cannot be read or written; names the file and the reason."""
+    """A mesh file cannot be read or written; the message names the file and the reason."""
 
 
 class SingularSystemError(RemeshvecError, ValueError):
-    """A linear system has no single solution; names what is missing (fixed vertices, a finite entry)."""
+    """A linear system has no unique solution.
+
+    The message names what is missing (fixed vertices, a finite entry).
+    """
 
 
 class WorkerError(RemeshvecError, RuntimeError):
@@ -38,20 +41,20 @@ class WorkerError(RemeshvecError, RuntimeError):
 
 
 class BatchError(RemeshvecError, RuntimeError):
-    """An item of a batch failed; names the item, and is raised from what went wrong with it.
+    """An item of a batch failed; raised from the item's own error.
 
     Attributes
     ----------
     index : int
-        Which item, counted from 0.
+        Number of the item, counted from 0.
     name : str
-        Its path, or what it is.
+        Path of the item, or a description.
+    reason : str
+        The item's own error in one line.
     """
 
     def __init__(self, index: int, name: str, reason: str) -> None:
-        super().__init__(
-            index, name, reason
-        )  # all of them: exceptions are pickled by their arguments
+        super().__init__(index, name, reason)  # all three: a pickle calls the class with `args`
         self.index = index
         self.name = name
         self.reason = reason

@@ -12,11 +12,13 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 import zoo
+from forked import quick_workers, real_workers  # noqa: F401
 
 from remeshvec import (
     BatchError,
@@ -32,6 +34,7 @@ from remeshvec import (
 )
 from remeshvec.batch import progress as _progress
 from remeshvec.processes import pool as _workers
+from remeshvec.processes.worker import END_PATIENCE
 
 ROOT = Path(__file__).resolve().parents[1]
 PATIENCE = 60.0
@@ -80,9 +83,14 @@ SLEEPS = Fatal(time.sleep, 10 * PATIENCE)
 
 def children():
     """Worker processes that are alive, and those that nobody has waited for."""
+    return children_of("self")
+
+
+def children_of(pid):
     found = []
-    for task in Path("/proc/self/task").iterdir():
-        found += (task / "children").read_text().split()
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        with suppress(OSError):  # a thread that has ended
+            found += (task / "children").read_text().split()
     return found
 
 
@@ -94,12 +102,17 @@ def no_processes_left():
     assert not [t for t in threading.enumerate() if t.name == "remeshvec feeder"]
 
 
-pytestmark = pytest.mark.usefixtures("no_processes_left")
+# Real workers start in tests of the results, of the start, and of what workers print.
+pytestmark = [
+    pytest.mark.usefixtures("no_processes_left", "quick_workers"),
+    pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning"),
+]
 
 
 # -- results --------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("real_workers")
 @pytest.mark.parametrize("workers", [1, 2])
 def test_the_same_bytes_as_one_at_a_time(workers, tmp_path):
     V, F = zoo.grid(9, 9)
@@ -143,11 +156,11 @@ def test_functions_need_a_module_or_cloudpickle(monkeypatch):
 def test_as_completed():
     """The first item waits for its death, the others do not wait for it."""
     items = [SLEEPS, *meshes(), *meshes()]
-    found = list(remesh_many(items, workers=2, ordered=False, on_error="collect", timeout=6.0))
+    found = list(remesh_many(items, workers=2, ordered=False, on_error="collect", timeout=3.0))
     assert sorted(item.index for item in found) == list(range(13))
     assert found[0].index != 0
     slow = next(item for item in found if item.index == 0)
-    assert isinstance(slow.error, WorkerError) and "timeout of 6 s" in str(slow.error)
+    assert isinstance(slow.error, WorkerError) and "timeout of 3 s" in str(slow.error)
     assert [item.index for item in found].index(0) > 4
     for item in found:
         if item is not slow:
@@ -203,6 +216,16 @@ def test_an_error_of_the_callers_generator_reaches_the_caller():
             list(remesh_many(items(), workers=workers))
 
 
+@pytest.fixture
+def quick_collection():
+    """Let the garbage collector look only at what a test makes: the rest costs it 0.3 s each time."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
+
+
+@pytest.mark.usefixtures("quick_collection")
 @pytest.mark.parametrize("workers", [1, 2])
 def test_nothing_is_kept_of_what_was_handed_on(workers):
     import weakref
@@ -331,12 +354,14 @@ def test_unexpected_errors_say_where_they_come_from():
     assert "_remesh_here" in "".join(found[0].error.__notes__)
 
 
+@pytest.mark.usefixtures("real_workers")
 def test_workers_that_cannot_start(monkeypatch):
     monkeypatch.setattr(_workers, "_START", "import sys; sys.exit(5)")
     with pytest.raises(WorkerError, match="exit code 5"):
         list(remesh_many([zoo.grid(4, 4)], workers=2, on_error="collect"))
 
 
+@pytest.mark.usefixtures("real_workers")
 def test_what_workers_print_does_not_disturb():
     found = list(remesh_many([zoo.grid(5, 5)], callback=print, workers=2, on_error="collect"))
     assert found[0].error is None and len(found[0].result.F) > 0
@@ -369,12 +394,15 @@ def test_calls_at_once():
 
 
 SCRIPT = """
-import sys, time
-import zoo
+import time
 from remeshvec import remesh_many
-from test_batch import SLEEPS
 
-for item in remesh_many([zoo.grid(5, 5), SLEEPS, zoo.grid(5, 5), SLEEPS], workers=2):
+class Sleeps:
+    def __reduce__(self):
+        return time.sleep, (600,)
+
+# The first one fails at once, without kernels to be loaded.
+for item in remesh_many(["absent.obj", Sleeps(), Sleeps()], workers=2, on_error="collect"):
     print(item.index, flush=True)
 """
 
@@ -400,14 +428,12 @@ def test_no_worker_survives(kind, tmp_path):
         text=True,
     )
     assert process.stdout.readline() == "0\n"
-    workers = []
-    for task in Path(f"/proc/{process.pid}/task").iterdir():
-        workers += (task / "children").read_text().split()
+    workers = children_of(process.pid)
     assert len(workers) == 2 and all(map(alive, workers))
     start = time.monotonic()
     process.send_signal(getattr(signal, kind))
     _, errors = process.communicate(timeout=PATIENCE)
-    assert time.monotonic() - start < _workers.PATIENCE
+    assert time.monotonic() - start < END_PATIENCE
     deadline = time.monotonic() + PATIENCE
     while any(map(alive, workers)) and time.monotonic() < deadline:
         time.sleep(0.05)

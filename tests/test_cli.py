@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import remeshvec
-from remeshvec.cli.command import Progress, main
+from remeshvec.cli.command import ProgressLine, main
 from remeshvec.errors import OptionError
 from remeshvec.files.mesh_files import SUFFIXES, read_mesh, write_mesh
 
@@ -117,7 +117,7 @@ def test_statistics_of_what_json_lacks_are_null(sheet, monkeypatch):
 
 def test_default_options_are_left_to_the_library(sheet, asked):
     assert main([sheet]) == 0
-    assert isinstance(asked[0].pop("callback"), Progress)
+    assert isinstance(asked[0].pop("callback"), ProgressLine)
     assert asked == [{"L": None, "preset": "default", "feature_angle": "auto", "boundary": "free"}]
 
 
@@ -187,7 +187,7 @@ def test_notices_and_dirt_are_shown(sheet, capsys):
         (["in.obj", "-o", "none/out.obj"], "cannot write none/out.obj: there is no folder"),
         (["in.obj", "-o", "folder.obj"], "cannot write folder.obj: it is a folder"),
         (["in.obj", "--save-stats", "none/s.json"], "there is no folder"),
-        (["in.obj", "-o", "a.json", "--save-stats", "a.json"], "need names of their own"),
+        (["in.obj", "-o", "a.json", "--save-stats", "a.json"], "two outputs have the same name"),
         (["in.obj", "--save-stats", "in.obj"], "would replace in.obj"),
     ],
 )
@@ -252,7 +252,7 @@ class Terminal(io.StringIO):
 
 def test_progress_rewrites_one_line_on_a_terminal(monkeypatch):
     monkeypatch.setattr("remeshvec.cli.command.PATIENCE", 0)
-    progress = Progress(Terminal())
+    progress = ProgressLine(Terminal())
     progress(0, "split", 1234)
     progress(0, "collapse", 5)
     progress.clear()
@@ -266,7 +266,7 @@ def test_progress_rewrites_one_line_on_a_terminal(monkeypatch):
 
 def test_progress_has_a_line_a_sweep_in_a_log(monkeypatch):
     monkeypatch.setattr("remeshvec.cli.command.PATIENCE", 0)
-    progress = Progress(io.StringIO())
+    progress = ProgressLine(io.StringIO())
     for sweep in range(2):
         for phase in ("split", "collapse"):
             progress(sweep, phase, 7)
@@ -275,7 +275,7 @@ def test_progress_has_a_line_a_sweep_in_a_log(monkeypatch):
 
 
 def test_short_work_shows_no_progress():
-    progress = Progress(Terminal())
+    progress = ProgressLine(Terminal())
     progress(0, "split", 7)
     progress.clear()
     assert progress.stream.getvalue() == ""

@@ -86,7 +86,7 @@ def test_everything_is_saved(asked, capsys):
     [
         (["--selection", "absent.txt"], "absent.txt"),
         (["--fixed-vertices", "half.txt"], "whole"),
-        (["--feature-edges", "odd.txt"], "2 numbers a row"),
+        (["--feature-edges", "odd.txt"], "2 numbers per row"),
         (["--fixed-faces", "words.txt"], "words.txt"),
         (["--fixed-vertices", "big.txt"], "fixed_vertices"),
         (["--min-length", "0.1"], "--adaptive"),

@@ -199,7 +199,7 @@ def test_of_a_dense_mesh_edges_are_left_out(result, monkeypatch):
     monkeypatch.setattr(_page_views, "MOST_EDGED", 60)
     page = html_report(result)
     assert data_of(page)["scene"]["edges"] is False
-    assert "Edges are left out, since more than 60 faces are shown" in text_of(page)
+    assert "Edges are left out because more than 60 faces are shown" in text_of(page)
 
 
 @pytest.mark.parametrize("scale", [1e-150, 1.0, 1e150])
@@ -263,7 +263,10 @@ def test_the_command_writes_a_page(tmp_path, monkeypatch, capsys):
     assert f"call remeshvec '{name}' --length 0.5 --html a.html --up z" in text
     for arguments, words in (
         (["--html", "a.txt"], "none of .html"),
-        (["-o", "a.obj", "--html", "./a.html", "--save-stats", "a.html"], "names of their own"),
+        (
+            ["-o", "a.obj", "--html", "./a.html", "--save-stats", "a.html"],
+            "two outputs have the same name",
+        ),
     ):
         assert main([name, *arguments]) == 2
         assert words in capsys.readouterr().err

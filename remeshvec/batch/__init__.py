@@ -1,1 +1,1 @@
-"""Files and many meshes through the pipeline."""
+"""The pipeline for a file with its data, and for many meshes."""

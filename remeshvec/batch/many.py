@@ -1,4 +1,4 @@
-"""Many meshes: any number of them, one after another or in several processes."""
+"""`remesh_many`: any number of meshes, one after another or in several processes."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ __all__ = ["BatchItem", "one_line", "remesh_many", "warm_up"]
 
 @dataclass
 class BatchItem:
-    """What became of one item of a batch.
+    """Result or error of one item of a batch.
 
     Attributes
     ----------
     index : int
-        Which item, counted from 0.
+        Number of the item, counted from 0.
     name : str
-        Its path, or what it is.
-    result : RemeshResult, or None where there is an error
-        What `remesh` returns.
+        Path of the item, or a description.
+    result : RemeshResult, or None after an error
+        The return value of `remesh`.
     error : Exception, or None
-        What went wrong: what `remesh` or `read_mesh` raise, or a `WorkerError`.
+        An error of `remesh` or `read_mesh`, or a `WorkerError`.
     seconds : float
-        How long it took, in its process, with reading.
+        Time in the worker process, with reading.
     """
 
     index: int
@@ -62,47 +62,48 @@ def remesh_many(
 ) -> Iterator[BatchItem]:
     """Remesh many meshes, in several processes.
 
-    Every result is the same, bit for bit, as that of a call of its own. Items are taken when they are
-    needed and results are not kept: any number of them fits into memory, given as a generator.
-    Processes end with the iterator, also by ``close()`` or an interrupt.
+    Every result is the same, bit for bit, as that of a separate call. Items are taken when they are
+    needed and results are not kept, so a generator can give any number of them. The processes end with
+    the iterator, also after ``close()`` or an interrupt.
 
     Parameters
     ----------
     items : iterable
-        Meshes: ``(V, F)``, the path of a file, what `read_mesh` or `remesh` return, or any other object
-        that `remesh` takes.
+        Meshes: ``(V, F)``, the path of a file, a result of `read_mesh` or `remesh`, or any other object
+        that `remesh` accepts.
     L : float, (n,) array, callable or Adaptive, optional
-        Target edge length, for all of them, as in `remesh`.
+        Target edge length for all items, as in `remesh`.
     workers : int, optional
-        Number of processes, all available cores by default. 1 does everything in this process. Each
-        process uses its part of the cores for large meshes.
+        Number of processes; by default as many as there are cores. With 1, everything runs in this
+        process. Each process uses its part of the cores for large meshes.
     on_error : {"raise", "collect"}
-        What an item does that fails, for whatever reason, even if its process dies: end the batch with
-        an exception, or become a `BatchItem` with an ``error``, after which the others go on.
+        ``"raise"``: an item that fails ends the batch with an exception, for whatever reason it fails,
+        even if its process dies. ``"collect"``: it becomes a `BatchItem` with an ``error``, and the
+        others go on.
     ordered : bool
         Whether results come in the order of the items, or as they are completed.
     progress : bool
-        Whether to show on the error stream how far it is: a bar with the package rich, lines without.
+        Show progress on the error stream: a bar if the package rich is installed, lines otherwise.
     timeout : float, optional
-        Seconds that one item may take; then its process is ended, and it has failed. With this even
-        ``workers=1`` is a process.
+        Seconds that one item may take. After that, its process is ended and the item has failed. With a
+        timeout, even ``workers=1`` uses a process.
     **options
-        Of `remesh`. A function among them (``L``, ``callback``) runs in the workers; those that no
-        module holds by name need the package cloudpickle.
+        Options of `remesh`. Functions among them (``L``, ``callback``) run in the workers; those that a
+        worker cannot import by name need the package cloudpickle.
 
     Yields
     ------
     BatchItem
-        One an item.
+        One per item.
 
     Raises
     ------
     BatchError
-        With ``on_error="raise"``, names the first item that failed; raised from its error.
+        An item failed with ``on_error="raise"``; the message names it. Raised from the item's error.
     OptionError
-        An argument cannot work, or cannot be sent to other processes.
+        An argument is invalid, or cannot be sent to other processes.
     WorkerError
-        No process can be started.
+        A process cannot be started.
 
     Examples
     --------
@@ -130,10 +131,10 @@ def remesh_many(
 
 
 class _Crew(NamedTuple):
-    """Who does the work, and how."""
+    """Which processes do the work, and how."""
 
     workers: int
-    is_here: bool  # nobody but this process
+    is_here: bool  # in this process alone
     ordered: bool
     timeout: float | None
 
@@ -158,8 +159,8 @@ def _check_names(options: Iterable[str]) -> None:
 
 
 def _with_names(items: Iterator[Any], options: dict[str, Any], crew: _Crew) -> Iterator[BatchItem]:
-    """Remesh, and put back what the workers did not need to be told."""
-    held: dict[int, tuple[str, Any]] = {}  # of the items on their way
+    """Remesh, and put back the names and arrays that the workers did not need."""
+    held: dict[int, tuple[str, Any]] = {}  # name and arrays of the items at work
 
     def tasks() -> Iterator[Any]:
         for index, item in enumerate(items):
@@ -188,7 +189,7 @@ def _item_outcomes(tasks: Iterator[Any], options: dict[str, Any], crew: _Crew) -
 
 
 def warm_up() -> None:
-    """Load kernels, or compile them: that takes its time, and is no item's fault."""
+    """Load kernels, or compile them, so that no item's timeout includes this time."""
     faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
     remesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces, 0.3)
 
@@ -200,11 +201,11 @@ def _raising(done: Iterator[BatchItem]) -> Iterator[BatchItem]:
                 raise BatchError(item.index, item.name, one_line(item.error)) from item.error
             yield item
     finally:
-        done.close()  # type: ignore[attr-defined]  # now: the exception may be held for long
+        done.close()  # type: ignore[attr-defined]  # now, since the caller may keep the exception
 
 
 def _mesh_of(item: Any) -> Any:
-    """Return ``(V, F)``, a path, or what only `remesh` knows what to do with."""
+    """Return ``(V, F)``, a path, or an object that `remesh` has to read."""
     if isinstance(item, MeshFile | RemeshResult):
         return item.V, item.F
     if isinstance(item, list) and len(item) == 2:
@@ -225,11 +226,11 @@ def _name(item: Any) -> str:
     try:
         return f"{len(mesh[0]):,} vertices, {len(mesh[1]):,} faces"
     except TypeError:
-        return "a pair of what are no arrays"
+        return "a pair of objects that are not arrays"
 
 
 def _remesh_here(mesh: Any, options: dict[str, Any]) -> Any:
-    """Remesh one item, of whatever kind."""
+    """Remesh one item of any kind."""
     if isinstance(mesh, str):
         mesh = read_mesh(mesh)[:2]
     if _is_vertex_face_pair(mesh):
@@ -239,7 +240,7 @@ def _remesh_here(mesh: Any, options: dict[str, Any]) -> Any:
 
 
 def _remesh_there(mesh: Any, options: dict[str, Any]) -> Any:
-    """Remesh one item; arrays that came from the caller are not sent back to it."""
+    """Remesh one item; do not send arrays of the caller back to it."""
     result = _remesh_here(mesh, options)
     if _is_vertex_face_pair(mesh) and isinstance(result, RemeshResult):
         result.report = replace(result.report, before=((), ()))
@@ -247,6 +248,6 @@ def _remesh_there(mesh: Any, options: dict[str, Any]) -> Any:
 
 
 def one_line(error: Exception) -> str:
-    """Name an error and what it says, in one line."""
+    """Return the type and the message of an error in one line."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__

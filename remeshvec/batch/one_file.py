@@ -1,4 +1,4 @@
-"""One file with all that it carries: read, remeshed, written."""
+"""`remesh_file`: read one file with all its data, remesh it, write it."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ __all__ = ["remesh_file", "with_feature_data"]
 def remesh_file(
     source: FilePath, target: FilePath, L: Any = None, **options: Unpack[RemeshKeywords]
 ) -> RemeshResult:
-    """Remesh a file with its colours, texture coordinates, fields and groups, where formats hold them.
+    """Remesh a file with its colours, texture coordinates, fields and groups, if the formats hold them.
 
     Parameters
     ----------
     source, target : str or path
-        Files; their suffixes give the formats. OBJ, OFF, PLY, STL and JSON, and what meshio (VTK, VTU,
-        Gmsh, XDMF, ...), pyvista (VTP) and trimesh (glTF) know, where these are installed.
+        Files; their suffixes give the formats: OBJ, OFF, PLY, STL and JSON, and those of meshio (VTK,
+        VTU, Gmsh, XDMF, ...), pyvista (VTP) and trimesh (glTF) if these packages are installed.
     L : float, array, callable or Adaptive, optional
     **options
         See `remesh`.
@@ -50,6 +50,6 @@ def remesh_file(
 
 
 def with_feature_data(data: MeshData, options: Any) -> dict[str, Any]:
-    """Return the options, with what the data want to be kept."""
+    """Return the options, with ``preserve`` extended by the seams and borders of the data."""
     kept = data.preserved(options.get("preserve"))
     return {**options, "preserve": kept} if kept else dict(options)

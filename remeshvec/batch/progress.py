@@ -1,4 +1,4 @@
-"""How far a batch is, on the error stream: a bar with the package rich, plain lines without."""
+"""Progress of a batch on the error stream: a bar if the package rich is installed, else plain lines."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["bar"]
 Item = TypeVar("Item")
 
 SECONDS = 10.0  # between two lines in a log
-BLINK = 0.1  # between two on a terminal
+BLINK = 0.1  # between two updates on a terminal
 
 
 class Display(Protocol):
-    """What shows progress."""
+    """A function that shows progress."""
 
     def __call__(self, done: int, failed: int) -> None:
-        """Show how many are done, failed ones among them."""
+        """Show how many items are done, including those that failed."""
 
 
 def bar(
@@ -29,7 +29,7 @@ def bar(
     has_failed: Callable[[Item], bool],
     stream: TextIO | None = None,
 ) -> Iterator[Item]:
-    """Pass items on, and show how many there were."""
+    """Yield the items, and show on a stream how many there were."""
     stream = sys.stderr if stream is None else stream
     failed = 0
     try:
@@ -62,7 +62,7 @@ def _display(stream: TextIO, total: int | None) -> Iterator[Display]:
 
 
 def _rich_progress(stream: TextIO, total: int | None) -> Any:
-    """Return a bar, None without the package."""
+    """Return a bar, or None if the package rich is not installed."""
     try:
         from rich.console import Console
         from rich.progress import (
@@ -89,7 +89,7 @@ def _rich_progress(stream: TextIO, total: int | None) -> Any:
 
 
 class Lines:
-    """Plain text: one line that is rewritten on a terminal, a line now and then in a log."""
+    """Plain text: one line that is rewritten on a terminal, or a line every `SECONDS` in a log."""
 
     def __init__(self, stream: TextIO, total: int | None) -> None:
         self.stream, self.total = stream, total
@@ -99,7 +99,7 @@ class Lines:
         self.told = (0, 0)
 
     def __call__(self, done: int, failed: int) -> None:
-        """Take note."""
+        """Note the state, and print it if the last line is old enough."""
         self.last = done, failed
         now = perf_counter()
         if now - self.shown >= (BLINK if self.rewrites else SECONDS):
@@ -107,7 +107,7 @@ class Lines:
             self._tell()
 
     def end(self) -> None:
-        """Tell the last state."""
+        """Print the last state."""
         if self.last != self.told:
             self._tell()
         if self.rewrites and self.told != (0, 0):

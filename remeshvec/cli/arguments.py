@@ -130,7 +130,7 @@ def target_length(options: argparse.Namespace, mesh: MeshFile) -> Any:
     if options.adaptive is not None:
         return Adaptive(options.adaptive, options.min_length, options.max_length)
     if options.min_length is not None or options.max_length is not None:
-        raise OptionError("--min-length and --max-length go with --adaptive")
+        raise OptionError("--min-length and --max-length need --adaptive")
     if options.length is not None or options.l_factor == DEFAULT_LENGTH_FACTOR:
         return options.length
     return options.l_factor * quality(mesh.V, mesh.F).edge_mean

@@ -1,4 +1,4 @@
-"""Small arrays that go with a mesh on the command line: indices, labels, lengths; and results."""
+"""Arrays that go with a mesh on the command line: indices, labels and lengths in, results out."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..output.result import RemeshResult
 
 __all__ = ["read_array", "write_arrays"]
 
-# What `write_arrays` saves of a result, under these names.
+# Attributes of a result that `write_arrays` saves under the same names.
 _SAVED = (
     "birth_face",
     "birth_barycentric",
@@ -39,14 +39,14 @@ def read_array(path: str, columns: int = 1, whole: bool = True) -> NDArray[np.ge
     ----------
     path : str
     columns : int
-        Numbers in a row of the result, (k,) for one and (k, columns) for more.
+        Numbers per row: the result has shape (k,) for one and (k, columns) for more.
     whole : bool
-        Whether the numbers are whole.
+        Whether the numbers must be whole.
 
     Raises
     ------
     MeshFormatError
-        The file cannot be read, or does not hold such numbers.
+        The file cannot be read, or does not hold numbers of this kind.
     """
     try:
         if Path(path).suffix == ".npy":
@@ -67,13 +67,15 @@ def read_array(path: str, columns: int = 1, whole: bool = True) -> NDArray[np.ge
         values = values.astype(np.int64)
     if columns > 1:
         if values.size % columns:
-            raise MeshFormatError(f"{path} must hold {columns} numbers a row; it has {values.size}")
+            raise MeshFormatError(
+                f"{path} must hold {columns} numbers per row; it has {values.size}"
+            )
         values = values.reshape(-1, columns)
     return values
 
 
 def write_arrays(path: str, result: RemeshResult) -> None:
-    """Save all arrays of a result besides the mesh, as ``.npz``."""
+    """Save all arrays of a result except the mesh, as ``.npz``."""
     arrays = {name: getattr(result, name) for name in _SAVED}
     buffer = io.BytesIO()
     np.savez(buffer, **{name: array for name, array in arrays.items() if array is not None})

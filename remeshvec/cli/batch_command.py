@@ -1,4 +1,4 @@
-"""``remeshvec batch``: many files, several at a time; goes on where an earlier run was interrupted."""
+"""``remeshvec batch``: remesh many files in parallel; continue an interrupted run."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from .batch_table import COLUMNS, MEASURES, Row, Table, write_parquet
 __all__ = ["EXIT_SOME_FAILED", "parsed", "run"]
 
 EXIT_SOME_FAILED = 3
-_SHOWN = 10  # failures in the summary on the terminal; the table has all
+_SHOWN = 10  # failures in the summary on the terminal; the table lists all
 
-# What decides where meshes go and who makes them, not what they become.
+# Arguments that do not influence the resulting meshes.
 _NOT_OPTIONS = (
     "inputs",
     "out",
@@ -54,7 +54,7 @@ def parsed(words: Sequence[str]) -> argparse.Namespace:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Remesh all files that are not done yet; returns the exit status."""
+    """Remesh all files that are not done yet; return the exit status."""
     start = time.perf_counter()
     batch = _prepared(options)
     todo = [job for job in batch.jobs if options.force or not _is_done(job, batch)]
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     batch.table.open()
     try:
         _run_jobs(todo, batch)
-    finally:  # also after an interrupt: all rows are in the table, and what is missing is named
+    finally:  # also after an interrupt: the table is complete, and the summary counts what is missing
         batch.table.close()
         summary = _summary(batch, skipped, time.perf_counter() - start)
         write_file(_summary_file(options), (json.dumps(summary, indent=2) + "\n").encode())
@@ -78,27 +78,27 @@ def run(options: argparse.Namespace) -> int:
 
 
 class _Batch(NamedTuple):
-    """What is to be done, and what is known of it."""
+    """The jobs of a run, and the rows known so far."""
 
     options: argparse.Namespace
     jobs: list[FileJob]
     table: Table
-    recipe: str  # names the options that decide on the result
-    current: dict[str, Row]  # what is done, failures too, by the names of outputs
+    recipe: str  # digest of the options that influence the results
+    current: dict[str, Row]  # rows of finished jobs, failed ones included, by output name
 
     def fresh(self, job: FileJob) -> Row:
-        """Return the row of a job before its work: everything that makes it its own."""
+        """Return the row of a job before its work: names, state of the input, options and version."""
         row: Row = dict.fromkeys(COLUMNS, "") | {"input": job.input, "output": job.output}
         try:
             found = os.stat(job.input)
             row |= {"input_bytes": found.st_size, "input_mtime_ns": found.st_mtime_ns}
-        except OSError:  # it has gone; reading it will say so
+        except OSError:  # the file has gone; reading it will raise the error
             pass
         return row | {"options": self.recipe, "version": remeshvec.__version__}
 
 
 def _prepared(options: argparse.Namespace) -> _Batch:
-    """Find all files and refuse what cannot work, before any work."""
+    """Find all files, and refuse what cannot work before any work starts."""
     _check_arguments(options)
     table = Table(_table_file(options))
     made = {os.path.realpath(os.path.join(options.out, name)) for name in table.rows}
@@ -121,7 +121,7 @@ def _prepared(options: argparse.Namespace) -> _Batch:
 
 def _check_arguments(options: argparse.Namespace) -> None:
     if options.adaptive is None and (options.min_length or options.max_length):
-        raise OptionError("--min-length and --max-length go with --adaptive")
+        raise OptionError("--min-length and --max-length need --adaptive")
     if options.table and Path(options.table).suffix.lower() not in (".csv", ".parquet"):
         raise OptionError(f"--table {options.table}: the suffix must be .csv or .parquet")
     if _is_parquet(options):
@@ -136,7 +136,7 @@ def _is_parquet(options: argparse.Namespace) -> bool:
 
 
 def _table_file(options: argparse.Namespace) -> str:
-    """Return the table that rows are appended to, which Parquet cannot be."""
+    """Return the CSV table that rows are appended to; Parquet files cannot be appended to."""
     if options.table and not _is_parquet(options):
         return str(options.table)
     return os.path.join(options.out, "results.csv")
@@ -147,13 +147,13 @@ def _summary_file(options: argparse.Namespace) -> str:
 
 
 def _recipe(options: argparse.Namespace) -> str:
-    """Name the options that decide on the results."""
+    """Return a digest of the options that influence the results."""
     chosen = {k: v for k, v in sorted(vars(options).items()) if k not in _NOT_OPTIONS}
     return hashlib.sha256(json.dumps(chosen).encode()).hexdigest()[:12]
 
 
 def _is_done(job: FileJob, batch: _Batch) -> bool:
-    """Whether the output is there and was made from this input, with these options, by this version."""
+    """Tell whether the output exists and was made from this input, these options and this version."""
     row = batch.table.rows.get(job.output)
     if row is None or row["error"] or not os.path.isfile(job.path):
         return False
@@ -166,8 +166,8 @@ def _is_done(job: FileJob, batch: _Batch) -> bool:
 
 
 def _run_jobs(todo: list[FileJob], batch: _Batch) -> None:
-    """Do what is left; every outcome goes to the table at once."""
-    rows = [batch.fresh(job) for job in todo]  # before: a file that changes meanwhile is done again
+    """Run the remaining jobs; add every outcome to the table at once."""
+    rows = [batch.fresh(job) for job in todo]  # now: a file that changes during the run is redone
     outcomes: Any = _outcomes(todo, batch.options)
     if not batch.options.quiet:
         outcomes = bar(outcomes, len(todo), lambda outcome: outcome.error is not None)
@@ -196,7 +196,7 @@ def _outcomes(todo: list[FileJob], options: argparse.Namespace) -> Any:
 
 
 def _remesh_file(job: FileJob, options: argparse.Namespace) -> Row:
-    """Read, remesh, write; return what is known of it."""
+    """Read, remesh and write one file; return the results for its row."""
     data, notices = read_data(job.input)
     mesh = MeshFile(data.V, data.F, notices)
     length = target_length(options, mesh)
@@ -222,7 +222,7 @@ def _remesh_file(job: FileJob, options: argparse.Namespace) -> Row:
 
 
 def _summary(batch: _Batch, skipped: int, seconds: float) -> dict[str, Any]:
-    """Sum up what was done, in earlier runs too."""
+    """Sum up all finished jobs, those of earlier runs included."""
     rows = [batch.current[job.output] for job in batch.jobs if job.output in batch.current]
     good = [row for row in rows if not row["error"]]
     failed = [row for row in rows if row["error"]]
@@ -267,6 +267,6 @@ def _print(summary: dict[str, Any], options: argparse.Namespace) -> None:
     print(f"written: {_table_file(options)}, {_summary_file(options)}", flush=True)
     if summary["not_done"]:
         print(
-            f"{summary['not_done']:,} meshes are not done; the same command goes on with them",
+            f"{summary['not_done']:,} meshes are not done; the same command continues with them",
             file=sys.stderr,
         )

@@ -1,4 +1,4 @@
-"""Which files a batch reads and writes: patterns, names in the folder of results, what collides."""
+"""The files that a batch reads and writes: patterns, output names, collisions."""
 
 from __future__ import annotations
 
@@ -18,38 +18,38 @@ class FileJob(NamedTuple):
     """One mesh of a batch."""
 
     input: str  # as it was found
-    output: str  # below the folder of results, with slashes: what identifies the job
-    path: str  # of the output
+    output: str  # relative to the folder of results, with slashes; identifies the job
+    path: str  # where the output goes
 
 
 class _Found(NamedTuple):
     path: str
-    root: str  # what comes before the first wildcard
+    root: str  # the folders before the first wildcard
 
 
 def find_jobs(
     patterns: Sequence[str], folder: str, suffix: str | None, made: Collection[str] = ()
 ) -> list[FileJob]:
-    """Look for inputs and name their outputs.
+    """Find the inputs and name their outputs.
 
-    The folders that all patterns share before their first wildcard are left out of the names of
-    outputs, the others are kept: ``in/a/x.obj`` and ``in/b/x.obj`` become ``a/x.obj`` and ``b/x.obj``.
+    Output names leave out the folders that all patterns share before their first wildcard, and keep
+    the others: ``in/a/x.obj`` and ``in/b/x.obj`` become ``a/x.obj`` and ``b/x.obj``.
 
     Parameters
     ----------
     patterns : sequence of str
-        Paths, or patterns as `glob` has them.
+        Paths, or patterns for `glob`.
     folder : str
-        Where outputs go.
+        Folder for the outputs.
     suffix : str, optional
-        Of the outputs; by default that of each input.
+        Suffix of the outputs; by default, outputs keep the suffixes of the inputs.
     made : collection of str
-        Outputs of earlier runs, as full paths, which patterns pass over.
+        Full paths of outputs of earlier runs, which patterns skip.
 
     Raises
     ------
     OptionError
-        A pattern matches nothing, or names a folder, or inputs have no folder in common.
+        A pattern matches nothing or names a folder, or the inputs have no folder in common.
     """
     found = [file for pattern in patterns for file in _files(pattern, made)]
     if not found:  # everything was made by earlier runs
@@ -93,12 +93,12 @@ def _root(pattern: str) -> str:
 
 
 def refuse_collisions(jobs: Iterable[FileJob], others: Iterable[str]) -> None:
-    """Refuse outputs with the same name, or with that of an input, or of another file to be written.
+    """Refuse an output that would replace an input, another output, or another file of the batch.
 
     Raises
     ------
     OptionError
-        There are such.
+        An output would replace another file.
     """
     jobs = list(jobs)
     taken = {os.path.realpath(path): "the batch itself writes it" for path in others}

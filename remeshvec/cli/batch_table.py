@@ -1,7 +1,7 @@
 """The table of results of a batch, which also tells what is done.
 
-A row is appended when a mesh is done, in one write, so that a killed run loses its last row at most;
-an incomplete line at the end is dropped. Rows are put in order, one a mesh, at the end of a run.
+A row is appended in one write when a mesh is done, so a killed run loses at most its last row; an
+incomplete line at the end is dropped. The end of a run sorts the rows, one per mesh.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..files.disk import write_file
 
 __all__ = ["COLUMNS", "MEASURES", "Table", "write_parquet"]
 
-# Measures of quality before and after: names of columns, and of what `quality` returns.
+# Measures of quality before and after: column names, and attributes of what `quality` returns.
 MEASURES = {
     "area_error": "area_error_face",
     "min_angle": "min_angle",
@@ -46,17 +46,17 @@ Row = dict[str, Any]
 
 
 class Table:
-    """Rows by the name of their output, and the CSV file that holds them."""
+    """Rows, keyed by the name of their output, and the CSV file that holds them."""
 
     def __init__(self, path: str) -> None:
-        """Read what is there.
+        """Read the rows that the file holds already.
 
         Raises
         ------
         OptionError
-            The file is something else.
+            The file is not a table of a batch.
         MeshFormatError
-            It cannot be read.
+            The file cannot be read.
         """
         self.path = path
         self.rows: dict[str, Row] = {}
@@ -67,7 +67,7 @@ class Table:
             raise MeshFormatError(f"cannot read {path}: {error.strerror}") from error
         self._parse(content[: content.rfind(b"\n") + 1].decode("utf-8", "surrogateescape"))
         if not self.rows and content and not content.startswith(b"input,output,"):
-            raise OptionError(f"{path} is no table of a batch; name another one with --table")
+            raise OptionError(f"{path} is not a table of a batch; name another one with --table")
 
     def _parse(self, text: str) -> None:
         for row in csv.DictReader(io.StringIO(text, newline="")):
@@ -75,17 +75,17 @@ class Table:
                 self.rows[row["output"]] = {name: row.get(name, "") for name in COLUMNS}
 
     def open(self) -> None:
-        """Begin to write: what could be read is put in order, and rows can be added."""
+        """Sort the rows that could be read, and open the file for more."""
         self.tidy()
         self._file = os.open(self.path, os.O_WRONLY | os.O_APPEND)
 
     def add(self, row: Row) -> None:
-        """Append a row, or what replaces one.
+        """Append a row; it replaces an earlier one with the same output.
 
         Raises
         ------
         MeshFormatError
-            It cannot be written.
+            The row cannot be written.
         """
         self.rows[row["output"]] = row
         if self._file is None:
@@ -99,19 +99,19 @@ class Table:
             raise MeshFormatError(f"cannot write {self.path}: no space is left")
 
     def close(self) -> None:
-        """Write all rows anew, in order."""
+        """Close the file and write all rows anew, sorted."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
             self.tidy()
 
     def tidy(self) -> None:
-        """Write the file: one row a mesh, whole or not at all."""
+        """Write one sorted row per mesh, all of them or none."""
         head = ",".join(COLUMNS) + "\n"
         write_file(self.path, (head + _lines(self.in_order())).encode("utf-8", "surrogateescape"))
 
     def in_order(self) -> list[Row]:
-        """Return all rows by the names of their outputs."""
+        """Return all rows, sorted by the names of their outputs."""
         return [self.rows[name] for name in sorted(self.rows)]
 
 
@@ -123,7 +123,7 @@ def _lines(rows: Iterable[Row]) -> str:
 
 
 def write_parquet(path: str, rows: list[Row]) -> None:
-    """Write rows to a Parquet file: numbers as numbers, nothing for what is not known."""
+    """Write rows to a Parquet file, with numbers as numbers and nulls for unknown entries."""
     import pyarrow
     import pyarrow.parquet
 

@@ -1,4 +1,4 @@
-"""The shell command: read a mesh, remesh it, show that it got better, write it."""
+"""The shell command: read a mesh, remesh it, compare its quality before and after, write it."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _ends(work: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
-    """Do the work; return the exit status, and say what went wrong in one line."""
+    """Do the work and return the exit status; print an error in one line."""
     try:
         status = work(options)
         sys.stdout.flush()
@@ -68,7 +68,7 @@ def _ends(work: Callable[[argparse.Namespace], int], options: argparse.Namespace
         return _failed("interrupted, nothing more was written", EXIT_INTERRUPTED)
     except MemoryError:
         return _failed("there is not enough memory", EXIT_FAILURE)
-    except BrokenPipeError:  # the reader of a pipe has gone, as `head` does
+    except BrokenPipeError:  # the reader of the pipe, such as `head`, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_FAILURE
     return status
@@ -80,7 +80,7 @@ def _failed(reason: str, status: int) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Do everything that the arguments ask for."""
+    """Read, remesh, write and show, as the arguments say."""
     _check_outputs(options)
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
@@ -118,7 +118,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    """Refuse before the work starts what could not be written or shown after it."""
+    """Refuse outputs that cannot be written or shown, before the work starts."""
     if options.output:
         check_data_writable(options.output)
     for path in (options.save_stats, options.save_arrays):
@@ -137,25 +137,25 @@ def _check_outputs(options: argparse.Namespace) -> None:
         check_writable(options.html, html_page.PAGE_SUFFIXES)
     paths = [Path(name).resolve() for name in _outputs(options)]
     if len(set(paths)) < len(paths):
-        raise OptionError("all files to be written need names of their own")
+        raise OptionError("two outputs have the same name; give each output its own")
     if Path(options.input).resolve() in paths[bool(options.output) :]:
-        raise OptionError(f"what is written beside the mesh would replace {options.input}")
+        raise OptionError(f"an output beside the mesh would replace the input {options.input}")
 
 
 def _outputs(options: argparse.Namespace) -> list[str]:
-    """Return the files that are to be written, the mesh first."""
+    """Return the paths of all outputs, the mesh first."""
     named = [options.output, options.save_stats, options.save_arrays, options.picture, options.html]
     return [name for name in named if name]
 
 
 def _length(options: argparse.Namespace, mesh: MeshFile) -> Any:
-    """Return the target length, None for the library's default or where a count is asked for."""
+    """Return the target length; None for the library's default, or if a count is given."""
     length = target_length(options, mesh)
     return length if options.lengths is None else read_array(options.lengths, whole=False)
 
 
 def _library_options(options: argparse.Namespace) -> dict[str, Any]:
-    """Return those options that were given, with the arrays that they name."""
+    """Return the options that were given, with arrays read from the files they name."""
     given = given_options(options)
     for name, columns in FILE_OPTIONS.items():
         path = getattr(options, name)
@@ -171,20 +171,20 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
     seconds[name] = time.perf_counter() - start
 
 
-class Progress:
-    """Tells on a stream how far the work is, once it has lasted longer than `PATIENCE`.
+class ProgressLine:
+    """Shows the progress on a stream once the work has lasted longer than `PATIENCE`.
 
-    On a terminal one line is rewritten; elsewhere, in a log, every sweep gets a line.
+    On a terminal it rewrites one line; elsewhere, in a log, it prints a line per sweep.
     """
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
         self.rewrites = stream.isatty()
         self.start = time.perf_counter()
-        self.shown = -1  # the sweep that was told last
+        self.shown = -1  # the last sweep that was shown
 
     def __call__(self, sweep: int, phase: str, count: int) -> None:
-        """Take note of a phase that is done; the library calls this."""
+        """Show a finished phase; `remesh` calls this."""
         passed = time.perf_counter() - self.start
         if passed < PATIENCE or (sweep == self.shown and not self.rewrites):
             return
@@ -196,17 +196,17 @@ class Progress:
             print(text, file=self.stream, flush=True)
 
     def clear(self) -> None:
-        """Take the line away."""
+        """Erase the line."""
         if self.rewrites and self.shown >= 0:
             print("\r\x1b[K", end="", file=self.stream, flush=True)
 
 
 @contextmanager
-def _progress(quiet: bool) -> Iterator[Progress | None]:
+def _progress(quiet: bool) -> Iterator[ProgressLine | None]:
     if quiet:
         yield None
         return
-    progress = Progress(sys.stderr)
+    progress = ProgressLine(sys.stderr)
     try:
         yield progress
     finally:
@@ -237,7 +237,7 @@ def _save_stats(options: argparse.Namespace, mesh: MeshFile, result: RemeshResul
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON can hold it: NaN and infinity, which it lacks, become null."""
+    """Return a value that JSON can hold; NaN and infinity become null."""
     if isinstance(value, dict):
         return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

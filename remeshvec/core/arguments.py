@@ -70,7 +70,7 @@ def number(
     ):
         return x
     raise OptionError(
-        f"{name} must be {_range(above, low, below, high, unit)}; got {_shown(value)}"
+        f"{name} must be {_range(above, low, below, high, unit)}; got {_in_one_line(value)}"
     )
 
 
@@ -84,7 +84,7 @@ def _as_float(value: Any) -> float:
         return inf
 
 
-def _shown(value: Any) -> str:
+def _in_one_line(value: Any) -> str:
     """Show a value in one line of bounded length."""
     line = " ".join(repr(value).split())
     return line if len(line) <= _MOST_SHOWN else line[: _MOST_SHOWN - 3] + "..."
@@ -115,14 +115,14 @@ def count(value: Any, name: str, *, low: int = 1, high: int | None = None) -> in
     is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool | np.bool_)
     if not is_whole or value < low or (high is not None and value > high):
         bounds = f", at least {low}" if high is None else f" from {low} to {high}"
-        raise OptionError(f"{name} must be a whole number{bounds}; got {_shown(value)}")
+        raise OptionError(f"{name} must be a whole number{bounds}; got {_in_one_line(value)}")
     return int(value)
 
 
 def flag(value: Any, name: str) -> bool:
     """Check True or False; 0, 1 and strings are neither."""
     if not isinstance(value, bool | np.bool_):
-        raise OptionError(f"{name} must be True or False; got {_shown(value)}")
+        raise OptionError(f"{name} must be True or False; got {_in_one_line(value)}")
     return bool(value)
 
 
@@ -133,13 +133,13 @@ def choice(value: Any, name: str, words: Iterable[str]) -> str:
         return value
     near = difflib.get_close_matches(value, known, 1) if isinstance(value, str) else []
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise OptionError(f"{name} must be one of {', '.join(known)}; got {_shown(value)}{hint}")
+    raise OptionError(f"{name} must be one of {', '.join(known)}; got {_in_one_line(value)}{hint}")
 
 
 def text(value: Any, name: str) -> str:
     """Check a string."""
     if not isinstance(value, str):
-        raise OptionError(f"{name} must be a string; got {_shown(value)}")
+        raise OptionError(f"{name} must be a string; got {_in_one_line(value)}")
     return value
 
 
@@ -147,21 +147,21 @@ def path(value: Any, name: str) -> str:
     """Check the path of a file, and return it as a string; whether the file is there is not asked."""
     found = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     if not isinstance(found, str):
-        raise OptionError(f"{name} must be the path of a file; got {_shown(value)}")
+        raise OptionError(f"{name} must be the path of a file; got {_in_one_line(value)}")
     return found
 
 
 def function(value: Any, name: str) -> Any:
     """Check something that can be called."""
     if not callable(value):
-        raise OptionError(f"{name} must be callable; got {_shown(value)}")
+        raise OptionError(f"{name} must be callable; got {_in_one_line(value)}")
     return value
 
 
 def instance(value: Any, name: str, kind: type | tuple[type, ...], noun: str) -> Any:
     """Check a value by its type; ``noun`` says in the message what is allowed."""
     if not isinstance(value, kind):
-        raise OptionError(f"{name} must be {noun}; got {_shown(value)}")
+        raise OptionError(f"{name} must be {noun}; got {_in_one_line(value)}")
     return value
 
 
@@ -169,5 +169,5 @@ def items(value: Any, name: str, noun: str) -> list[Any]:
     """Check a sequence that is not a string; ``noun`` says in the message what it must hold."""
     is_text = isinstance(value, str | bytes)
     if is_text or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
-        raise OptionError(f"{name} must be a sequence of {noun}; got {_shown(value)}")
+        raise OptionError(f"{name} must be a sequence of {noun}; got {_in_one_line(value)}")
     return list(value)

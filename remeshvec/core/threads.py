@@ -1,9 +1,9 @@
-"""Threads: the pieces of a loop are shared by plain Python threads.
+"""Plain Python threads that share the pieces of a loop.
 
-Kernels release the GIL, so plain Python threads run them at once, on one build. Numba's own parallel
-loops would need a second one, cannot be entered by two Python threads at once nor after a fork, and wait
-for all their threads at the end of every loop, for milliseconds if another process holds a core. Here
-whoever is awake takes the next piece.
+Kernels release the GIL, so plain Python threads run them in parallel, with one build of each kernel.
+Numba's own parallel loops would need a second build. Two Python threads cannot enter them at once, nor
+can a forked child, and at the end of every loop they wait for all their threads: for milliseconds if
+another process holds a core. Here any thread that is awake takes the next piece.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numba
 
 __all__ = ["available_threads", "share", "thread_scope", "uninterrupted"]
 
-_PIECES = 16  # for each thread: where one is held up, the others take its pieces
+_PIECES = 16  # per thread: the others take the pieces of one that is held up
 
 
 class _Helpers:
@@ -32,13 +32,13 @@ class _Helpers:
         self.lock = threading.Lock()
 
     def ask(self, job: Callable[[], None], count: int, most: int) -> None:
-        """Let up to ``count`` threads do a job, of ``most`` that there should be when all are busy."""
+        """Let up to ``count`` threads do a job; start new ones until there are ``most``."""
         with self.lock:
             while self.count < most:
-                self.count += 1  # before: an interrupt may come while the thread starts
+                self.count += 1  # before the start: an interrupt may come during it
                 try:
                     threading.Thread(target=self._work, daemon=True, name="remeshvec").start()
-                except RuntimeError:  # no more threads to be had; the caller does the work
+                except RuntimeError:  # the system refuses more threads; the caller does the work
                     self.count -= 1
                     break
         for _ in range(min(count, self.count)):
@@ -50,15 +50,15 @@ class _Helpers:
 
 
 class _Job:
-    """The pieces of one loop: whoever comes takes the next."""
+    """The pieces of one loop, taken one after another by all threads."""
 
     def __init__(self, run: Callable[..., None], count: int, pieces: int, args: Any) -> None:
         self.run, self.count, self.pieces, self.args = run, count, pieces, args
         self.next = itertools.count().__next__  # atomic
-        self.finished: SimpleQueue[int | BaseException] = SimpleQueue()  # pieces, by each helper
+        self.finished: SimpleQueue[int | BaseException] = SimpleQueue()  # pieces per helper
 
     def take(self) -> int:
-        """Run pieces until none is left; returns how many."""
+        """Run pieces until none is left; return how many."""
         taken = 0
         while (i := self.next()) < self.pieces:
             self._run(i)
@@ -66,7 +66,7 @@ class _Job:
         return taken
 
     def help(self) -> None:
-        """Run pieces on another thread."""
+        """Run pieces on a helper thread, and report their number or the error."""
         try:
             taken = self.take()
         except BaseException as error:
@@ -81,7 +81,15 @@ class _Job:
 
 
 def share(run: Callable[..., None], count: int, args: Any) -> None:
-    """Run all pieces of a loop on the threads that this call may use now."""
+    """Run all pieces of a loop on the threads that this call may use now.
+
+    Parameters
+    ----------
+    run : callable
+        Called as ``run((first, last), *args)`` for ranges of ``range(count)``.
+    count : int
+    args : tuple
+    """
     calls = max(1, _calls)
     threads = min(_scope.threads, available_threads() // calls)
     if threads < 2:
@@ -98,14 +106,15 @@ def share(run: Callable[..., None], count: int, args: Any) -> None:
                 raise done
             left -= done
     except BaseException:
-        job.pieces = 0  # nobody begins another one
+        job.pieces = 0  # no helper begins another one
         raise
 
 
 def uninterrupted(run: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-    """Call a function where no `KeyboardInterrupt` reaches it; one here leaves it to end by itself.
+    """Call a function on a thread of its own, where no `KeyboardInterrupt` reaches it.
 
-    Numba is not made to be interrupted: it keeps its lock, and other threads wait for ever.
+    An interrupt of the caller leaves the function to end by itself. Numba cannot be interrupted: it
+    would keep its lock, and other threads would wait for ever.
     """
     if threading.current_thread() is not threading.main_thread():
         return run(*args, **kwargs)
@@ -125,19 +134,19 @@ def uninterrupted(run: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
 
 
 class _Scope(threading.local):
-    """Threads that the call on this Python thread wants, itself among them."""
+    """The number of threads that the call on this Python thread wants, itself included."""
 
     threads = 1
 
 
 _helpers = _Helpers()
 _scope = _Scope()
-_calls = 0  # that are running in this process
+_calls = 0  # running in this process
 _calls_lock = threading.Lock()
 
 
 def _after_fork() -> None:
-    """Start anew: a forked child has no threads but its own."""
+    """Start anew: a forked child has only its own thread."""
     global _helpers, _calls, _calls_lock
     _helpers = _Helpers()
     _calls = 0
@@ -149,15 +158,15 @@ if hasattr(os, "register_at_fork"):
 
 
 def available_threads() -> int:
-    """Count the threads that a call may use at most (Numba's limit, which follows the CPU mask)."""
+    """Return the most threads that a call may use (Numba's limit, which follows the CPU mask)."""
     return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
 @contextmanager
 def thread_scope(threads: int) -> Iterator[bool]:
-    """Ask for threads for one call; yields whether there may be more than one.
+    """Ask for threads for one call; yield whether it may use more than one.
 
-    Calls that run at the same time share what is available, each loop anew.
+    Calls that run at the same time share the available threads; every loop divides them anew.
     """
     global _calls
     wanted = min(threads, available_threads())

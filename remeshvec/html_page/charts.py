@@ -1,4 +1,4 @@
-"""The histograms of the HTML page, counted here: a page holds bars, not every edge and angle."""
+"""The histograms of the HTML page, counted here, so that the page holds bars instead of all values."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ __all__ = ["build_charts"]
 
 
 BARS = 50
-MOST_VALENCE = 12  # larger ones are counted with it
+MOST_VALENCE = 12  # larger valences are counted with it
 
 
 def build_charts(
     elements: tuple[Elements, Elements], qualities: tuple[Quality, Quality], length: float
 ) -> list[dict[str, Any]]:
-    """Count edge lengths, angles, valences, and areas, before and after, into the same bars.
+    """Count edge lengths, angles, valences and areas, before and after, into the same bars.
 
     Parameters
     ----------
     elements : (Elements, Elements)
-        What is counted, before and after.
+        Edges and faces of the meshes before and after.
     qualities : (Quality, Quality)
         Measures of the same meshes, which hold the valences.
     length : float
-        Target length L, the unit of lengths; areas are in those of an equilateral triangle with it.
+        Target length L, the unit of lengths; the unit of areas is an equilateral triangle with edges L.
 
     Returns
     -------
     list of dict
-        JSON-ready: centres of the bars, their width, counts and percentages before and after, the
-        ideal value, and words.
+        JSON-ready: centres and width of the bars, counts and percentages before and after, the ideal
+        value, and labels.
     """
     unit_area = EQUILATERAL_AREA * length**2
     return [
@@ -59,7 +59,7 @@ def _lengths_like(
     elements: tuple[Elements, Elements],
     measure: Callable[[Elements], FloatArray],
 ) -> dict[str, Any]:
-    """Count what has no upper bound; the longest half percent may end up in the last bar."""
+    """Count values without an upper bound; the last bar may take the largest half percent."""
     values = [measure(one) for one in elements]
     top = float(np.clip(max(np.percentile(v, 99.5) if len(v) else 0 for v in values), 1.9, 3.9))
     top = np.ceil(10 * top + 1) / 10

@@ -1,11 +1,11 @@
 """One page of HTML that shows a result, with Plotly inside (the extra ``[html]``).
 
 `html_report` returns the page, `write_html` writes it, `show_html` shows it in a notebook or in the
-browser. The page loads nothing: scripts, styles and meshes are in it, and its own policy forbids the
-browser to ask the network. The same result gives the same page, bit for bit.
+browser. The page loads nothing: it contains its scripts, styles and meshes, and its own policy forbids
+the browser to use the network. The same result gives the same page, bit for bit.
 
-Views and histograms are made here as plain data (`_page_views`, `_page_charts`), and drawn by
-``page/report.js``; meshes go to Plotly as typed arrays, which all its versions take.
+`views` and `charts` make 3D views and histograms as plain data, and ``report.js`` draws them. Meshes go
+to Plotly as typed arrays, which all its versions accept.
 """
 
 from __future__ import annotations
@@ -54,35 +54,35 @@ class PlotlyMissingError(RemeshvecError, ImportError):
 
 
 def html_report(result: RemeshResult, *, title: str = "", command: str = "", up: str = "y") -> str:
-    """Return a page that shows a result: one HTML file that needs no network and no server.
+    """Return a page that shows a result: one HTML file that needs neither a network nor a server.
 
-    It has both meshes in linked 3D views, coloured by shape, smallest angle or area of the faces;
-    histograms of edge lengths, angles, valences and areas over each other; the measures; the options,
-    sweeps and version. Of meshes with more than 200,000 faces the views show a part; edges are drawn
-    up to 50,000 faces. The page says so.
+    The page has both meshes in linked 3D views, coloured by shape, smallest angle or area of the faces;
+    overlaid histograms of edge lengths, angles, valences and areas; the measures; the options, sweeps
+    and version. For meshes with more than 200,000 faces the views show a part, and above 50,000 faces
+    they leave edges out. The page says so.
 
     Parameters
     ----------
     result : RemeshResult
-        What `remesh` returned. The arrays that it was called with are read again.
+        Result of `remesh`. The page reads the arrays that `remesh` was called with again.
     title : str
         Heading, such as the name of the mesh.
     command : str
-        The call, as text, shown among the options.
+        Text of the call, shown among the options.
     up : {"y", "z"}
         Axis that points up in the first view.
 
     Returns
     -------
     str
-        The page, about 5 MB of it Plotly.
+        The page; Plotly takes about 5 MB of it.
 
     Raises
     ------
     PlotlyMissingError
         Plotly is not installed.
     OptionError
-        `up` is no such axis.
+        An argument is invalid.
     """
     report = _report_of(result)
     up = arguments.choice(up, "up", UP)
@@ -133,7 +133,7 @@ def write_html(
     Parameters
     ----------
     path : str or path
-        File with the suffix .html or .htm; replaced when the new one is complete.
+        File with the suffix .html or .htm; an existing file is replaced when the new one is complete.
     result, title, command, up
         As for `html_report`.
 
@@ -144,7 +144,7 @@ def write_html(
     MeshFormatError
         The file cannot be written.
     OptionError
-        `up` is no such axis.
+        An argument is invalid.
     """
     check_writable(arguments.path(path, "path"), PAGE_SUFFIXES)
     page = html_report(result, title=title, command=command, up=up)
@@ -152,10 +152,10 @@ def write_html(
 
 
 def show_html(result: RemeshResult, *, title: str = "", up: str = "y") -> None:
-    """Show the page of `html_report`: in a Jupyter notebook below the cell, else in the browser.
+    """Show the page of `html_report`: below the cell of a Jupyter notebook, else in the browser.
 
-    A notebook that is saved holds the page, about 5 MB. The file for a browser is in the folder for
-    temporary files and stays; where no browser is found, its name is printed.
+    A saved notebook contains the page, about 5 MB. For a browser, the page is a file in the folder for
+    temporary files, which stays there; if there is no browser, its name is printed.
 
     Parameters and errors are those of `html_report`.
     """
@@ -171,7 +171,7 @@ def show_html(result: RemeshResult, *, title: str = "", up: str = "y") -> None:
 
 
 def require_plotly() -> Any:
-    """Import what holds Plotly's script and return it; to be called before long work is done.
+    """Import the module with Plotly's script and return it; call this before long work for a page.
 
     Raises
     ------
@@ -185,7 +185,7 @@ def require_plotly() -> Any:
 
 
 def _report_of(result: Any) -> Report:
-    """Return the report of a result; the type itself stands above this folder."""
+    """Return the report of a result, whose type this folder must not import."""
     report = getattr(result, "report", None)
     if not hasattr(report, "quality_after"):
         raise OptionError(
@@ -195,14 +195,14 @@ def _report_of(result: Any) -> Report:
 
 
 def _is_in_notebook() -> bool:
-    """Whether a kernel runs this, which shows HTML; a terminal with IPython does not."""
-    ipython = sys.modules.get("IPython")  # whoever is in a notebook has it imported
+    """Tell whether a Jupyter kernel runs this; IPython in a terminal cannot show HTML."""
+    ipython = sys.modules.get("IPython")  # a notebook has imported it
     shell = ipython.get_ipython() if ipython else None
     return getattr(shell, "kernel", None) is not None
 
 
 def _page_frame(page: str) -> str:
-    """Wrap a page for a notebook: styles and names of one do not meet those of the other."""
+    """Wrap a page in a frame that keeps its styles and names apart from those of the notebook."""
     return (
         f'<div><iframe srcdoc="{html.escape(page)}" sandbox="allow-scripts allow-downloads" '
         f'style="width:100%;height:{FRAME_HEIGHT}px;border:0"></iframe></div>'
@@ -214,18 +214,18 @@ def _part(name: str) -> str:
 
 
 def _text(value: object) -> str:
-    """Escape for HTML; half a surrogate pair, as names of files may hold, cannot be encoded."""
+    """Escape for HTML; replace lone surrogates, which file names may hold and UTF-8 cannot."""
     return html.escape(str(value).encode("utf-8", "replace").decode())
 
 
 def _page_json(value: Any) -> str:
-    """Return JSON that may stand in a script element: no tag begins or ends in it."""
+    """Return JSON that is safe in a script element: it holds no angle brackets."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e")
 
 
 def _table(rows: Iterable[Sequence[object]], heading: Sequence[str] = ()) -> str:
-    """Return a table; the first column names the rows."""
+    """Return an HTML table; the first column names the rows."""
     lines = ["<table>"]
     if heading:
         cells = "".join(f'<th scope="col">{_text(name)}</th>' for name in heading)
@@ -245,7 +245,7 @@ def _summary_table(report: Report) -> str:
 
 
 def _tiles(before: Quality, after: Quality) -> str:
-    """Return the few figures that most readers want, before and after."""
+    """Return tiles with the figures that most readers want, before and after."""
     chosen = (
         "faces",
         "edges in 4/5 to 4/3 L",
@@ -270,7 +270,7 @@ def _degrees(text: str) -> str:
 
 
 def _call(report: Report, command: str) -> str:
-    """Return what was asked for, and what was found on the way."""
+    """Return a table of the call and of what the report noted."""
     rows = [("call", command)] if command else []
     rows += [("sweeps ended", report.stop)]
     rows += [(f"input: {_words(name)}", f"{n:,}") for name, n in report.dirt.items()]

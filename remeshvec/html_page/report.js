@@ -3,7 +3,7 @@
   const { scene, charts } = JSON.parse(document.getElementById("data").textContent);
   const ids = ["view-before", "view-after"];
   const config = { displayModeBar: false, displaylogo: false, responsive: true };
-  const LIFT = 0.002; // of edges above the faces; the surface reaches from -1 to 1
+  const LIFT = 0.002; // height of edges above the faces; the surface reaches from -1 to 1
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
   function unpack(text, type) {
@@ -13,7 +13,7 @@
     return new type(bytes.buffer);
   }
 
-  // Every third number, from the first, second and third on.
+  // Every third number, starting at the first, the second and the third.
   function columns(array) {
     return [0, 1, 2].map((k) => array.filter((_, at) => at % 3 === k));
   }
@@ -41,7 +41,7 @@
     return [once.map((key) => Math.floor(key / n)), once.map((key) => key % n)];
   }
 
-  // Directions at the vertices, area-weighted; zero where there is no area.
+  // Area-weighted normals at the vertices; zero where there is no area.
   function normalsOf({ vertices, faces }) {
     const normals = new Float32Array(vertices.length);
     for (let f = 0; f < faces.length; f += 3) {
@@ -60,8 +60,8 @@
     return normals;
   }
 
-  // Edges that lie in the faces would be lost in rounding, so they are drawn a little above them:
-  // outside where there is an outside, else on both sides.
+  // Rounding would hide edges that lie in the faces, so they are drawn a little above them: on the
+  // outside of a closed surface, else on both sides.
   function edgeTrace(mesh, view) {
     const ends = edgesOf(mesh);
     const normals = normalsOf(mesh);
@@ -139,7 +139,7 @@
     };
   }
 
-  // How far what is seen from there reaches to the left, right, down and up, in slopes.
+  // How far the object reaches to the left, right, down and up as seen from there, in slopes.
   function onScreen(x, y, distance) {
     const { right, up, eye } = scene.camera;
     const dot = (v, at, axis) => (v[at] * axis[0] + v[at + 1] * axis[1] + v[at + 2] * axis[2]) / 2;
@@ -294,7 +294,7 @@
     });
   }
 
-  // Lets the browser show what there is: words at once, then charts, then one view after the other.
+  // Let the browser show each part when it is ready: text at once, then charts, then one view at a time.
   const pause = () => new Promise((done) => setTimeout(done, 20));
 
   async function draw() {

@@ -1,4 +1,4 @@
-"""What the 3D views of the HTML page draw: small arrays, colours of faces, and the first camera."""
+"""Data of the 3D views of the HTML page: compact arrays, colours of faces, and the first camera."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ __all__ = ["COLOURINGS", "MOST_EDGED", "MOST_FACES", "Views", "build_views"]
 
 # At these limits Chromium draws a page within 4 to 7 seconds on two cores without a graphics card, and
 # the page has 16 MB.
-MOST_FACES = 200_000  # of a mesh
-MOST_EDGED = 50_000  # faces with edges drawn, and of the part that is shown of a larger mesh
+MOST_FACES = 200_000  # of a mesh that is shown whole
+MOST_EDGED = 50_000  # faces with edges drawn, and faces shown of a larger mesh
 
-# Red to blue [ColorBrewer, RdYlBu] and brown to green [BrBG]: told apart by the colour-blind too.
+# Red to blue [ColorBrewer, RdYlBu] and brown to green [BrBG]: safe for the colour-blind.
 _SHAPE_COLOURS = ("#7d0a1e", "#c8282c", "#ee6a43", "#fbb165", "#fdebb0", "#cfe6f0", "#8dbfdd")
 _AREA_COLOURS = ("#7a4a0c", "#c9964a", "#f0dcae", "#f4f4f2", "#b9e2da", "#4fa99c", "#0a5c54")
 
@@ -50,7 +50,7 @@ COLOURINGS: tuple[dict[str, Any], ...] = (
 
 
 class Views(NamedTuple):
-    """The scene, and what must be said about it."""
+    """The scene, and notes about it for the reader."""
 
     scene: dict[str, Any]  # JSON-ready
     notes: list[str]
@@ -64,19 +64,19 @@ def build_views(
     Parameters
     ----------
     meshes : (Elements, Elements)
-        Before and after.
+        The meshes before and after.
     qualities : (Quality, Quality)
-        Measures of the same meshes, whose volumes tell where outside is.
+        Measures of the same meshes; the sign of the volume tells which side is outside.
     length : float
-        The target length L that areas are compared with.
+        The target length L, the unit of areas.
     up : {"y", "z"}
         Axis that points up.
 
     Returns
     -------
     Views
-        Coordinates are relative to the middle of what is shown and at most 1 from it, float32: so
-        neither size nor place costs digits.
+        Coordinates are float32, relative to the middle of the shown part and at most 1 from it, so they
+        lose no digits to size or place.
     """
     camera = three_quarter_view(meshes[0].V, meshes[0].F, UP[up])
     shown = _shown_faces(meshes, camera)
@@ -103,7 +103,7 @@ def build_views(
 
 
 def _shown_faces(meshes: tuple[Elements, Elements], camera: Camera) -> list[IntArray]:
-    """Choose the faces that are shown: all, or those around the point that is nearest to the eye."""
+    """Choose the faces to show: all, or those around the point nearest to the eye."""
     if max(len(mesh.F) for mesh in meshes) <= MOST_FACES:
         return [np.arange(len(mesh.F)) for mesh in meshes]
     first = meshes[0].V[meshes[0].F].mean(axis=1)
@@ -120,9 +120,9 @@ def _middle(points: FloatArray) -> FloatArray:
 def _mesh(
     mesh: Elements, kept: IntArray, middle: FloatArray, reach: float, length: float
 ) -> dict[str, Any]:
-    """Return one mesh in base64: coordinates, indices, and a byte a face for each colouring."""
+    """Return one mesh in base64: coordinates, indices, and one byte per face for each colouring."""
     used, F = np.unique(mesh.F[kept], return_inverse=True)
-    with np.errstate(divide="ignore"):  # no area: as small as can be shown
+    with np.errstate(divide="ignore"):  # a face without area gets the smallest level
         doublings = np.log2(mesh.areas[kept] / (EQUILATERAL_AREA * length**2))
     levels = {
         "shape": mesh.radius_ratios[kept],
@@ -140,7 +140,7 @@ def _mesh(
 
 
 def _sides(quality: Quality) -> list[int]:
-    """Return the sides that edges are drawn on: that of the normals 1, the other -1."""
+    """Return the sides on which edges are drawn: 1 for the side of the normals, -1 for the other."""
     if quality.volume is None:
         return [1, -1]
     return [1] if quality.volume >= 0 else [-1]
@@ -156,8 +156,8 @@ def _notes(meshes: tuple[Elements, Elements], shown: list[IntArray], with_edges:
         notes.append(
             f"The views show a part of the surface, {len(shown[0]):,} faces before and "
             f"{len(shown[1]):,} after, so that browsers can turn it; all numbers and histograms are of "
-            "the whole."
+            "the whole surface."
         )
     if not with_edges:
-        notes.append(f"Edges are left out, since more than {MOST_EDGED:,} faces are shown.")
+        notes.append(f"Edges are left out because more than {MOST_EDGED:,} faces are shown.")
     return notes

@@ -1,1 +1,1 @@
-"""Worker processes that do one task after another."""
+"""Worker processes that do one task after another, and survive each other's deaths."""

@@ -1,9 +1,9 @@
-"""Worker processes that do one task after another; one that dies takes its task with it, no other.
+"""A pool of worker processes; a worker that dies fails only its current task.
 
-Plain processes and pipes. `concurrent.futures` gives up all tasks when one process dies, and what
-`multiprocessing` starts runs the caller's script again, which then needs a guard. Every worker has a
-thread here that hands it the next task when it has answered, so that it works on while the caller does
-something else.
+The workers are plain processes with pipes. `concurrent.futures` gives up all tasks when one process dies.
+Processes of `multiprocessing` run the caller's script again, which then needs a guard. Here every worker
+has a thread in the parent, which hands it the next task as soon as it has answered, so it works on while
+the caller does something else.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from ..core.threads import available_threads
 from ..errors import OptionError, WorkerError
 from .worker import END_PATIENCE, attempt, receive, send
 
-__all__ = ["Outcome", "run_here", "run_in_processes"]
+__all__ = ["Outcome", "run_here", "run_in_processes", "start_process"]
 
-# Tasks in the hands of this module, for every worker: one that it does, and some that wait for it or,
-# where answers have to keep their order, for an earlier one. Sizes differ by a factor of twenty.
+# Tasks per worker that are taken but not yet handed on: one at work, and some that wait for the worker
+# or, where outcomes keep their order, for an earlier task. Sizes of meshes differ by a factor of twenty.
 AHEAD = 4
 
-_STARTS = 3  # tries to start a worker
+_STARTS = 3  # attempts to start a worker
 
 _START = (
     "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); "
@@ -39,19 +39,19 @@ _START = (
 
 
 class Outcome(NamedTuple):
-    """What became of one task."""
+    """Value or error of one task."""
 
-    number: int  # of the task
+    number: int  # of the task, counted from 0
     value: Any  # None where there is an error
     error: Exception | None
     seconds: float
 
 
 def run_here(function: Callable[..., Any], tasks: Iterable[Any], common: Any) -> Iterator[Outcome]:
-    """Do tasks one by one in this process; the next is taken when the last one's outcome is."""
+    """Do tasks one by one in this process; take each task only when its outcome is asked for."""
     for index, task in enumerate(tasks):
         outcome = Outcome(index, *attempt(function, task, common))
-        task = None  # an error keeps the frames that led to it
+        task = None  # an error keeps the frames that led to it, with their variables
         yield outcome
         del outcome
 
@@ -65,32 +65,36 @@ def run_in_processes(
     timeout: float | None = None,
     warm_up: Callable[[], None] | None = None,
 ) -> Iterator[Outcome]:
-    """Do tasks in processes: ``function(task, common)``.
+    """Call ``function(task, common)`` for every task, in worker processes.
 
     Parameters
     ----------
     function : callable
-        Of a module, by whose name the workers find it.
+        A function of a module; the workers import it by name.
     tasks : iterable
-        Taken when they are needed: at most ``AHEAD * workers`` before the outcome of the first of them
-        is asked for.
+        Tasks, taken when they are needed: at most ``AHEAD * workers`` before the outcome of the first of
+        them is asked for.
     common : object
-        What all tasks share.
+        Second argument of all calls, sent once to every worker.
     workers : int
         Number of processes; each may use its part of the cores.
     ordered : bool
         Whether outcomes come in the order of the tasks.
     timeout : float, optional
-        Seconds after which a task is given up, with its worker.
+        Seconds after which a task fails and its worker is ended.
     warm_up : callable, optional
-        What a worker does before its first task, outside of the timeout.
+        Called by every worker before its first task; the timeout does not include it.
+
+    Yields
+    ------
+    Outcome
 
     Raises
     ------
     OptionError
         ``common`` cannot be sent to the workers.
     WorkerError
-        No worker can be started.
+        A worker cannot be started.
     """
     pool = _Pool(_setup(function, common, warm_up), workers, timeout)
     try:
@@ -100,9 +104,9 @@ def run_in_processes(
 
 
 def _collect(pool: _Pool, tasks: Iterator[Any], most: int, ordered: bool) -> Iterator[Outcome]:
-    """Keep the pool busy, and yield outcomes in their turn."""
+    """Keep the pool busy, and yield outcomes in order or as they come."""
     waiting: dict[int, Outcome] = {}
-    given = done = 0  # tasks handed out, outcomes handed on
+    given = done = 0  # tasks handed out, outcomes yielded
     more = True
     while True:
         while more and given - done < most:
@@ -113,7 +117,7 @@ def _collect(pool: _Pool, tasks: Iterator[Any], most: int, ordered: bool) -> Ite
                 break
             pool.tasks.put((given, task))
             given += 1
-            task = None  # the caller's arrays are the caller's
+            task = None  # do not keep the caller's arrays alive
         if done == given:
             return
         while not (done in waiting if ordered else waiting):
@@ -135,14 +139,14 @@ def _setup(*parts: Any) -> bytes:
     content = _with_cloudpickle(parts) or content
     if content is None:
         raise OptionError(
-            f"an option cannot be sent to worker processes ({problem}); functions can with the package "
-            "cloudpickle, and workers=1 sends nothing"
+            f"an option cannot be sent to worker processes ({problem}); the package cloudpickle can send "
+            "functions, and workers=1 sends nothing"
         ) from problem
     return content
 
 
 def _with_cloudpickle(value: Any) -> bytes | None:
-    """Pickle functions of a script or without a name, which pickle cannot, if the package is here."""
+    """Pickle also functions of scripts and lambdas, if cloudpickle is installed; None if that fails."""
     try:
         import cloudpickle
     except ImportError:
@@ -154,14 +158,14 @@ def _with_cloudpickle(value: Any) -> bytes | None:
 
 
 class _Pool:
-    """The threads that feed workers, and the workers."""
+    """The workers, and the threads that feed them."""
 
     def __init__(self, setup: bytes, count: int, timeout: float | None) -> None:
         self.setup, self.timeout = setup, timeout
         self.tasks: queue.SimpleQueue[tuple[int, Any] | None] = queue.SimpleQueue()
         self.workers: set[_Worker] = set()
         self.threads = max(1, available_threads() // count)
-        self.folder = os.getcwd()  # where relative paths start, also for workers to come
+        self.folder = os.getcwd()  # where relative paths start, also for workers started later
         self._answers: queue.SimpleQueue[Outcome | Exception] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._stopping = False
@@ -176,7 +180,7 @@ class _Pool:
         """Return the next outcome, in any order."""
         answer = None
         while answer is None:
-            try:  # in turns: elsewhere than on Unix an interrupt does not end a wait
+            try:  # with a timeout: outside Unix, an interrupt does not end a wait
                 answer = self._answers.get(timeout=1.0)
             except queue.Empty:
                 continue
@@ -185,7 +189,7 @@ class _Pool:
         return answer
 
     def stop(self) -> None:
-        """End all workers, whatever they are doing, and wait for their end."""
+        """End all workers, busy or not, and wait for them."""
         with self._lock:
             self._stopping = True
             workers = list(self.workers)
@@ -200,7 +204,7 @@ class _Pool:
             feeder.join(1.0)
 
     def _feed(self) -> None:
-        """Hand tasks to one worker, which is replaced when it dies."""
+        """Hand tasks to one worker, and replace it when it dies."""
         worker = None
         try:
             while not self._stopping and (task := self.tasks.get()) is not None:
@@ -238,7 +242,7 @@ class _Pool:
             return Outcome(index, None, WorkerError(reason), perf_counter() - start)
 
     def _started(self) -> _Worker:
-        """Start a worker; one that dies on the way, for want of memory say, is tried again."""
+        """Start a worker; try again if it dies at once, for want of memory perhaps."""
         for left in reversed(range(_STARTS)):
             with self._lock:
                 if self._stopping:
@@ -257,8 +261,8 @@ class _Pool:
                 self._let_go(worker)
                 break
         raise OptionError(
-            f"worker processes cannot use an option ({refusal}); functions have to stand in a module "
-            "that they can import, or need the package cloudpickle; workers=1 sends nothing"
+            f"worker processes cannot use an option ({refusal}); functions must be in a module that "
+            "they can import, or need the package cloudpickle; workers=1 sends nothing"
         )
 
     def _let_go(self, worker: _Worker) -> None:
@@ -268,23 +272,28 @@ class _Pool:
             self.workers.discard(worker)
 
 
+def start_process(threads: int, folder: str) -> subprocess.Popen[bytes]:
+    """Start the process of a worker."""
+    return subprocess.Popen(
+        [sys.executable, "-c", _START],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        cwd=folder,
+        env={**os.environ, "NUMBA_NUM_THREADS": str(threads)},
+        start_new_session=True,  # Ctrl-C reaches the parent only, which then ends the workers
+    )
+
+
 class _Worker:
     """A process, and the pipes to and from it."""
 
     def __init__(self, threads: int, folder: str) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _START],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            cwd=folder,
-            env={**os.environ, "NUMBA_NUM_THREADS": str(threads)},
-            start_new_session=True,  # Ctrl-C is for us, who then end the workers
-        )
+        self._process = start_process(threads, folder)
         assert self._process.stdin is not None and self._process.stdout is not None
         self._to: BinaryIO = self._process.stdin  # type: ignore[assignment]
         self._from: BinaryIO = self._process.stdout  # type: ignore[assignment]
         self.is_alive = True
-        path = [os.path.abspath(entry) for entry in sys.path]  # "" is the folder we are in
+        path = [os.path.abspath(entry) for entry in sys.path]  # "" means the current folder
         try:
             self._to.write(pickle.dumps(path))
         except OSError:
@@ -296,7 +305,7 @@ class _Worker:
         Raises
         ------
         WorkerError
-            There was none: the process has died, or was ended because it took too long.
+            There is no answer: the process died, or was ended because it took too long.
         """
         late = threading.Event()
         timer = threading.Timer(min(timeout or 0.0, threading.TIMEOUT_MAX), self._give_up, [late])
@@ -317,12 +326,12 @@ class _Worker:
         return answer
 
     def end_soon(self) -> None:
-        """Ask the process to drop what it is doing, which clears half-written files away."""
+        """Ask the process to end; it removes half-written files first."""
         self.is_alive = False
         self._process.terminate()
 
     def end(self, patience: float = END_PATIENCE) -> None:
-        """Wait for the end of the process, and bring it about."""
+        """Wait for the process to end, and kill it if it does not."""
         try:
             self._process.wait(max(0.0, patience))
         except subprocess.TimeoutExpired:
@@ -330,9 +339,9 @@ class _Worker:
             self._process.wait()
 
     def close(self) -> None:
-        """Close the pipes; for the thread that uses them."""
+        """Close the pipes; call this on the thread that uses them."""
         for pipe in (self._to, self._from):
-            with suppress(OSError):  # what was not sent yet has nobody to go to
+            with suppress(OSError):  # unsent data has no reader any more
                 pipe.close()
 
     def _give_up(self, late: threading.Event) -> None:

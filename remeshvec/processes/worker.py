@@ -1,4 +1,4 @@
-"""What runs in a worker process: one task after another, each answered in a message."""
+"""The main loop of a worker process: it answers every task with one message."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from ..errors import RemeshvecError, WorkerError
 
 __all__ = ["END_PATIENCE", "attempt", "receive", "send", "serve"]
 
-END_PATIENCE = 5.0  # seconds to clear away what a process is about, before it is killed
+END_PATIENCE = 5.0  # seconds that a process has to clean up before it is killed
 
-_LENGTH = struct.Struct("<Q")  # of a message, before it
+_LENGTH = struct.Struct("<Q")  # length of a message, sent in front of it
 
 
 def serve() -> None:
     """Answer messages from the standard input until it ends, or until this process is asked to end.
 
-    The main thread works; another one reads, and so sees at once when the process that wants the
-    results has gone, however it went.
+    The main thread works. Another thread reads, so it notices at once when the parent process has
+    gone, for whatever reason.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # KeyboardInterrupt
     source = sys.stdin.buffer
     target = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what is printed here must not get among the answers
+    os.dup2(2, 1)  # prints must not end up among the answers
     messages: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-    threading.Thread(target=_read, args=(source, messages), daemon=True).start()
     status = 0
     try:
+        threading.Thread(target=_read, args=(source, messages), daemon=True).start()
         _work(messages, target)
-    except (KeyboardInterrupt, OSError):  # nobody reads the answers any more
+    except (KeyboardInterrupt, OSError):  # the parent no longer reads the answers
         pass
     except BaseException:
         traceback.print_exc()
@@ -60,8 +60,8 @@ def _read(source: BinaryIO, messages: queue.SimpleQueue[bytes | None]) -> None:
 
 
 def _interrupt() -> None:
-    """Let the main thread drop what it is doing, and end the process where it does not."""
-    if hasattr(signal, "pthread_kill"):  # ends system calls, too
+    """Interrupt the main thread, and end the process if that has no effect."""
+    if hasattr(signal, "pthread_kill"):  # also ends system calls
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
     else:
         _thread.interrupt_main(signal.SIGTERM)
@@ -87,7 +87,7 @@ def _work(messages: queue.SimpleQueue[bytes | None], target: BinaryIO) -> None:
 
 
 def _answer(function: Callable[..., Any], message: bytes, common: Any) -> bytes:
-    """Do one task; the answer is a pickled (value, error, seconds)."""
+    """Do one task; return a pickled (value, error, seconds)."""
     start = perf_counter()
     try:
         task = pickle.loads(message)
@@ -107,7 +107,7 @@ def _answer(function: Callable[..., Any], message: bytes, common: Any) -> bytes:
 def attempt(
     function: Callable[..., Any], task: Any, common: Any
 ) -> tuple[Any, Exception | None, float]:
-    """Return value, error and seconds."""
+    """Call the function; return its value or its error, and the seconds."""
     start = perf_counter()
     try:
         return function(task, common), None, perf_counter() - start
@@ -118,16 +118,16 @@ def attempt(
 
 
 def _let_go_of_arrays(error: BaseException | None) -> None:
-    """Keep of an error where it comes from, but no variables: many errors may be kept."""
+    """Drop the variables of an error and keep its traceback: a caller may keep many errors."""
     while error is not None:
         traceback.clear_frames(error.__traceback__)
         error = error.__cause__ or error.__context__
 
 
 def _portable(error: Exception) -> Exception:
-    """Return an error that survives the way to another process."""
+    """Return an error that can be sent to another process."""
     try:
-        if not isinstance(error, RemeshvecError):  # nobody expected it: say where it comes from
+        if not isinstance(error, RemeshvecError):  # unexpected: add where it comes from
             frames = "".join(traceback.format_exception(type(error), error, error.__traceback__))
             error.__notes__ = [f"In a worker process:\n{frames}"]
         pickle.loads(pickle.dumps(error))

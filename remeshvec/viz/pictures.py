@@ -1,7 +1,7 @@
 """Pictures of a mesh before and after, with PyVista (the extra ``[viz]``).
 
-`picture` renders offscreen to a file, `show` opens a window; both put the two meshes side by side
-under one camera.
+`picture` renders to a file without a window, `show` opens a window. Both show the two meshes side by
+side under one camera.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ Arrays = tuple[ArrayLike, ArrayLike]  # V (n, 3), F (m, 3)
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 BACKGROUND, FRONT, BACK, EDGE, TEXT = "white", "#d3e3f3", "#ecd5b8", "#1c2a3a", "#1c2a3a"
-# Seen from the side that shows most, turned by a third of a right angle and from a little above:
-# depth is seen, and hardly any of the silhouette is lost.
+# Seen from the side that shows most, turned by a third of a right angle and from a little above: this
+# shows depth and hides hardly any of the silhouette.
 TURN, ELEVATION = np.radians(28.0), np.radians(17.0)
-# Below this share of the largest extent a surface lies like a map and is seen from high above.
+# A surface lower than this share of its largest extent lies like a map and is seen from high above.
 FLAT, FLAT_ELEVATION = 0.25, np.radians(50.0)
 UP = {"y": np.eye(3), "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])}  # x, up, front
-VIEW_ANGLE = 20.0  # degrees; a long lens, so that near triangles do not look larger
+VIEW_ANGLE = 20.0  # degrees; a long lens, with which near triangles look hardly larger
 MARGIN = 1.06
 TITLE_BAND = 0.04  # height of the titles, in widths of the picture
 LOWEST, HIGHEST = 0.25, 0.6  # height of a picture without the titles, in widths
-CLEAR_EDGE, FAINTEST = 11.0, 0.25  # pixels an edge needs to be drawn in full; least opacity
+CLEAR_EDGE, FAINTEST = 11.0, 0.25  # length in pixels of edges drawn in full; least opacity
 
 
 class ViewerMissingError(RemeshvecError, ImportError):
@@ -53,7 +53,7 @@ class ViewerMissingError(RemeshvecError, ImportError):
 
 
 class Camera(NamedTuple):
-    """Where to look from: unit vectors from the object to the eye, to the right, and up."""
+    """Direction of view: unit vectors from the object to the eye, to the right, and up."""
 
     eye: FloatArray
     right: FloatArray
@@ -61,7 +61,7 @@ class Camera(NamedTuple):
 
 
 class CameraFrame(NamedTuple):
-    """What is in the picture: the middle, half the width and height, and the size in pixels."""
+    """The visible part of space: its middle, half its width and height, and the size in pixels."""
 
     middle: FloatArray
     half_width: float
@@ -70,7 +70,7 @@ class CameraFrame(NamedTuple):
 
 
 class PictureScene(NamedTuple):
-    """What a picture shows: two meshes with their titles, and from where."""
+    """Two meshes with their titles, the direction of view and the visible part of space."""
 
     meshes: tuple[tuple[FloatArray, IntArray], tuple[FloatArray, IntArray]]
     titles: tuple[str, str]
@@ -92,15 +92,15 @@ def picture(
     Parameters
     ----------
     path : str or path
-        PNG or JPEG file; replaced when the new one is complete.
+        PNG or JPEG file; an existing file is replaced when the new one is complete.
     before, after : ((n, 3) float, (m, 3) int)
         Vertices and faces of the two meshes.
     titles : (str, str)
-        Names that stand above the meshes, with their numbers of faces.
+        Names above the meshes, in front of their numbers of faces.
     width : int
-        Width in pixels; the height follows from the object.
+        Width in pixels; the height follows from the shape of the object.
     up : {"y", "z"}
-        Axis that points up: y in most models of figures, z in most of buildings and parts.
+        Axis that points up: y in most models of figures, z in most of buildings and machine parts.
 
     Raises
     ------
@@ -108,9 +108,13 @@ def picture(
         PyVista is not installed.
     MeshFormatError
         The file cannot be written.
+    MeshInputError
+        The arrays cannot be triangle meshes.
+    OptionError
+        Another argument is invalid.
     """
     path = arguments.path(path, "path")
-    scene = _scene(before, after, titles, width, up)
+    scene = _picture_scene(before, after, titles, width, up)
     pyvista = require_viewer()
     check_writable(path, PICTURE_SUFFIXES)
     from PIL import Image
@@ -136,27 +140,31 @@ def show(
     width: int = 1600,
     up: str = "y",
 ) -> None:
-    """Open a window with two meshes side by side and linked cameras; returns when it is closed.
+    """Open a window with two meshes side by side and linked cameras; return when it is closed.
 
-    Parameters and errors are those of `picture`, but for the path.
+    Parameters are those of `picture`, without the path.
 
     Raises
     ------
     ViewerMissingError
         PyVista is not installed, or there is no display.
+    MeshInputError
+        The arrays cannot be triangle meshes.
+    OptionError
+        Another argument is invalid.
     """
-    scene = _scene(before, after, titles, width, up)
+    scene = _picture_scene(before, after, titles, width, up)
     pyvista = require_viewer(window=True)
     _plotter(pyvista, scene, off_screen=False).show()
 
 
 def require_viewer(*, window: bool = False) -> Any:
-    """Import PyVista and return it; to be called before long work is done for a picture.
+    """Import PyVista and return it; call this before long work for a picture.
 
     Parameters
     ----------
     window : bool
-        Whether a window is to be opened, which needs a display.
+        Also check that there is a display, which a window needs.
 
     Raises
     ------
@@ -176,10 +184,10 @@ def require_viewer(*, window: bool = False) -> Any:
     return pyvista
 
 
-def _scene(
+def _picture_scene(
     before: Arrays, after: Arrays, titles: tuple[str, str], width: int, up: str
 ) -> PictureScene:
-    """Check what the caller wants in a picture, and place the camera."""
+    """Check the arguments of a picture, and place the camera."""
     meshes = (_as_arrays(before, "before"), _as_arrays(after, "after"))
     axes = UP[arguments.choice(up, "up", UP)]
     width = arguments.count(width, "width")
@@ -192,7 +200,7 @@ def _scene(
 
 
 def _plotter(pyvista: Any, scene: PictureScene, *, off_screen: bool) -> Any:
-    """Set the scene: two meshes, one camera for both."""
+    """Build the scene: two meshes, one camera for both."""
     meshes, titles, camera, frame = scene
     plotter = pyvista.Plotter(
         shape=(1, 2), border=False, window_size=list(frame.pixels), off_screen=off_screen
@@ -200,7 +208,7 @@ def _plotter(pyvista: Any, scene: PictureScene, *, off_screen: bool) -> Any:
     plotter.set_background(BACKGROUND)
     for k, ((V, F), title) in enumerate(zip(meshes, titles, strict=True)):
         plotter.subplot(0, k)
-        # Float32 on the graphics card: scaled, so that neither size nor place costs digits.
+        # Graphics cards use float32: scaled points lose no digits to their size or place.
         points = (V - frame.middle) / frame.half_height
         surface = pyvista.PolyData.from_regular_faces(points, F)
         _add_surface(plotter, surface, _mean_edge(points, F) * frame.pixels[1] / 2)
@@ -238,7 +246,7 @@ def _add_title(plotter: Any, text: str, frame: CameraFrame) -> None:
 
 
 def _aim(plotter: Any, camera: Camera) -> None:
-    """Look at the scaled scene, of which the heights from -1 to 1 are in the picture."""
+    """Look at the scaled scene; the picture shows heights from -1 to 1."""
     distance = 1 / np.tan(np.radians(VIEW_ANGLE / 2))
     plotter.camera.focal_point = (0.0, 0.0, 0.0)
     plotter.camera.position = tuple(camera.eye * distance)
@@ -295,19 +303,19 @@ def _as_axes(axes: ArrayLike) -> FloatArray:
 
 
 def _frame(points: FloatArray, camera: Camera, width: int) -> CameraFrame:
-    """Fit the picture to the points: both panels show all of them, below the titles."""
+    """Fit the picture to the points: both panels show all of them below the titles."""
     axes = np.stack([camera.right, camera.up, camera.eye])
     along = points @ axes.T
     low, high = along.min(axis=0), along.max(axis=0)
     extent = high - low
     across, upwards, near = np.maximum(extent, 1e-6 * extent.max() or 1.0) / 2
-    # What lies nearer than the middle looks larger; half of the depth is a bound for it.
+    # Parts nearer than the middle look larger; they are nearer by at most half of the depth.
     zoom = MARGIN * (1 + near * np.tan(np.radians(VIEW_ANGLE / 2)) / max(across, upwards))
     object_height = width / 2 * np.clip(upwards / across, 2 * LOWEST, 2 * HIGHEST)
     height = object_height + TITLE_BAND * width
     unit = zoom * max(2 * upwards / object_height, 2 * across / (width / 2))  # of one pixel
     middle = (low + high) / 2
-    middle[1] += TITLE_BAND * width * unit / 2  # the object stands below the titles
+    middle[1] += TITLE_BAND * width * unit / 2  # the titles are above the object
     return CameraFrame(middle @ axes, unit * width / 4, unit * height / 2, (width, round(height)))
 
 
