@@ -188,7 +188,7 @@ def test_notices_and_dirt_are_shown(sheet, capsys):
         (["in.obj", "-o", "folder.obj"], "cannot write folder.obj: it is a folder"),
         (["in.obj", "--save-stats", "none/s.json"], "there is no folder"),
         (["in.obj", "-o", "a.json", "--save-stats", "a.json"], "two outputs have the same name"),
-        (["in.obj", "--save-stats", "in.obj"], "would replace in.obj"),
+        (["in.obj", "--save-stats", "in.obj"], "would replace the input in.obj"),
     ],
 )
 def test_bad_input_ends_with_one_line_before_the_work(arguments, reason, sheet, capsys, asked):

@@ -75,7 +75,19 @@ class Adaptive:
             )
 
     def limits(self, extent: float) -> tuple[float, float]:
-        """Shortest and longest length, on a mesh whose bounding box has sides up to ``extent``."""
+        """Return the shortest and the longest length for a mesh whose longest side is ``extent``.
+
+        Parameters
+        ----------
+        extent : float
+            Longest side of the bounding box.
+
+        Raises
+        ------
+        OptionError
+            ``extent`` is not a number, or negative.
+        """
+        extent = number(extent, "extent", low=0.0)
         shortest, longest = self.min_length, self.max_length
         if shortest is None:
             shortest = min(3.0 * self.tolerance, inf if longest is None else longest)
