@@ -1,4 +1,4 @@
-"""Values that are made when they are first asked for."""
+"""Values that are computed on first use."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ T = TypeVar("T")
 
 
 class Lazy(Generic[T]):
-    """A value that is made when it is first asked for: once, and at the latest for a pickle or a copy.
+    """A value that ``make`` computes on first use, once; pickling or copying counts as use.
 
-    What ``make`` holds is let go of then.
+    ``make`` is dropped afterwards, and with it all that it holds.
     """
 
     def __init__(self, make: Callable[[], T]) -> None:
@@ -39,7 +39,7 @@ def _known_value(value: T) -> Lazy[T]:
 
 
 class LazyRecipe(Lazy[T]):
-    """The same, but a pickle or a copy takes along what it is made of, which is sooner done."""
+    """Like `Lazy`, but pickles the recipe instead of the value: faster."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         with self._lock:

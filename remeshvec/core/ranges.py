@@ -1,4 +1,4 @@
-"""Even ranges of elements, which threads share."""
+"""Even ranges of elements for threads to share."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .vocabulary import IntArray
 __all__ = ["even_ranges", "per_range"]
 
 
-# Ranges at most: each has a row of marks for all vertices, of which it touches little.
+# Most ranges. Each has a row of marks for all vertices, though it touches few of them.
 _MOST_RANGES = 16
 
 
 def even_ranges(count: int, parallel: bool) -> IntArray:
-    """Cut ``range(count)`` into one range, or two for each thread."""
+    """Cut ``range(count)`` into one range, or, where threads share the work, into two per thread."""
     if not parallel:
         return np.array([0, count])
     ranges = min(2 * available_threads(), _MOST_RANGES)
@@ -25,5 +25,5 @@ def even_ranges(count: int, parallel: bool) -> IntArray:
 
 
 def per_range(cuts: IntArray, *_: Any) -> int:
-    """Pieces of a loop over ranges."""
+    """Return the number of ranges: one piece of a threaded loop each."""
     return len(cuts) - 1

@@ -1,4 +1,4 @@
-"""Seconds by phase."""
+"""Time spent in each phase."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["Stopwatch"]
 
 
 class _Lap:
-    """One timed block; a generator in its place is slower, which small meshes notice."""
+    """One timed block. A generator would be slower, which small meshes notice."""
 
     __slots__ = ("phase", "seconds", "start")
 
@@ -25,7 +25,7 @@ class _Lap:
 
 
 class Stopwatch:
-    """Adds up seconds by phase."""
+    """Adds up the seconds that each phase takes."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -36,5 +36,5 @@ class Stopwatch:
         return _Lap(self.seconds, phase)
 
     def stop(self) -> dict[str, float]:
-        """Return the seconds by phase, with the total since the watch was made."""
+        """Return the seconds per phase, and the total since the watch was made."""
         return {**self.seconds, "total": perf_counter() - self._start}

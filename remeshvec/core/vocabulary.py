@@ -1,4 +1,4 @@
-"""Vocabulary: dtypes, the records of arrays that kernels take, sentinels, tolerances."""
+"""Vocabulary: dtypes, the records of arrays that kernels take, sentinels, shared constants."""
 
 from __future__ import annotations
 
@@ -37,22 +37,22 @@ IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-NONE = -1  # no twin: the half-edge lies on the boundary; no curve: the edge is no feature
+NONE = -1  # as a twin: the half-edge is on the boundary; as a curve: the edge is not a feature
 DEAD = -1  # origin of all three half-edges of a removed face
 
-# Edges on feature curves name a half-edge of the reference surface that lies on the same curve.
-FROZEN = -2  # instead of that: the edge stays as it is
-HALTED = -3  # likewise, until the end of the sweep
-NON_MANIFOLD = (
-    1 << 30
-)  # added to that: the edge has siblings on other sheets, which must do what it does
+# A number on both half-edges tells the curve of an edge; `mesh.edge_curves` reads it. On a feature curve
+# it is the name of the curve, which is a half-edge of the reference surface on it, or one of these:
+FROZEN = -2  # locked: never split, collapsed or flipped
+HALTED = -3  # locked until the end of the sweep
+# Added to the name of a non-manifold edge, whose siblings on other sheets must change as it does.
+NON_MANIFOLD = 1 << 30
 
-# Kinds of vertices, in the order of what they may do; a collapse keeps the larger kind.
+# Kinds of vertices, from free to fixed; a collapse keeps the larger kind.
 INNER = 0  # moves freely
-HELD = 1  # an inner vertex that the sweeps hold: the tip of a horn, or where moves lead too far
+HELD = 1  # inner, but held by the sweeps: the tip of a horn, or where moves lead too far
 CURVE = 2  # slides along its feature curve: a crease, the boundary, a border between labels
-PINNED = 3  # a vertex of a curve that the sweeps hold
-FIXED = 4  # a vertex of the input that never moves, never vanishes
+PINNED = 3  # on a curve, and held by the sweeps
+FIXED = 4  # a vertex of the input that never moves and never vanishes
 
 # Where the caller names no length, the target length is this many mean edges.
 DEFAULT_LENGTH_FACTOR = 0.9
@@ -64,8 +64,8 @@ EQUILATERAL_AREA = sqrt(3.0) / 4.0
 # 6e-8, and texture coordinates of one vertex are often computed once for every face.
 EQUAL_DATA = 1e-6
 
-# Bound for every walk around a vertex. A structure that passed the build always closes sooner; the
-# bound turns a broken one into a wrong answer instead of a hang.
+# Bound for every walk around a vertex. On a mesh that passed the build every walk ends earlier; the bound
+# turns a broken mesh into a wrong answer instead of a hang.
 MAX_VALENCE = 1 << 20
 
 
@@ -79,10 +79,10 @@ class Mesh(NamedTuple):
     twin : (3 m,) int32
         Opposite half-edge, ``NONE`` on the boundary.
     curve : (3 m,) int32
-        ``NONE`` off feature curves; see ``FROZEN`` and ``NON_MANIFOLD`` for the others. Both half-edges
-        of an edge are on a curve or neither is.
+        ``NONE`` off feature curves; otherwise read with `mesh.edge_curves`. Either both half-edges of an
+        edge are on a curve or neither is.
     source : (m,) int32
-        Face of the reference surface, in the same patch between curves: where the face comes from.
+        Face of the reference surface that the face comes from, in the same patch between curves.
     vertex_halfedge : (n,) int32
         One outgoing half-edge; for a boundary vertex the one without twin; ``DEAD`` if removed.
     valence_excess : (n,) int32
@@ -92,8 +92,8 @@ class Mesh(NamedTuple):
     kind : (n,) uint8
         ``INNER``, ``HELD``, ``CURVE``, ``PINNED`` or ``FIXED``.
     birth : (n,) int32
-        Half-edge of the reference surface: on its face lies an inner vertex, on its edge the vertex
-        of a curve; a fixed vertex is its origin.
+        Half-edge of the reference surface. An inner vertex lies on its face, a vertex of a curve on its
+        edge, and a fixed vertex is its origin.
     """
 
     origin: IndexArray
@@ -107,7 +107,7 @@ class Mesh(NamedTuple):
     birth: IndexArray
 
     def copy(self) -> Mesh:
-        """Return the mesh in arrays of its own: phases change theirs."""
+        """Return a copy with arrays of its own: phases change arrays in place."""
         return Mesh(*(array.copy() for array in self))  # type: ignore[arg-type]
 
 
@@ -119,7 +119,7 @@ class Blocks(NamedTuple):
 
 
 class Tree(NamedTuple):
-    """Reference surface with its bounding-volume tree; see ``bvh``.
+    """Reference surface with its bounding-volume tree; see `reference.bvh`.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ class Tree(NamedTuple):
     twin : (3 m,) int32
         Opposite half-edges, ``NONE`` on feature curves: no walk leaves its patch.
     patch : (m,) int32
-        Patch of every face: what walks can reach.
+        Patch of every face: faces that walks can reach from each other.
     boxes : (k, 6) float64
         Lower and upper corners of the boxes, leaves first.
     level : (l + 1,) int64

@@ -13,8 +13,7 @@ from ..core.arguments import choice, instance, number
 from ..core.check import as_array, as_indices, as_mask, as_mesh, as_numbers, which
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
-from ..mesh.edges import components, halfedge_ends
-from ..mesh.repair import count_edges
+from ..mesh.edges import components, count_edges, halfedge_ends
 from .energies import areas, volumes
 from .forces import Forces, body_volumes_at, energy_at, forces_at, hessian_at
 

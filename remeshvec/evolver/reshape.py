@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.vocabulary import FloatArray, IntArray
-from ..mesh.edges import edge_keys
-from ..mesh.repair import count_edges
+from ..mesh.edges import count_edges, edge_keys
 from ..pipeline.remesh import remesh
 from .energies import volumes
 from .minimize import with_restored_volumes

@@ -6,15 +6,16 @@ cut into blocks whose number depends on the size of the mesh only, and a phase r
 
 * ``OWNED``: a block takes the candidates whose whole footprint lies in its own vertex range. Sets
   of different blocks cannot conflict: blocks run in parallel, each in order, in place.
-* ``SHIFTED``: the same over blocks shifted by half a block, for what straddled a border.
-* ``SHIFTED + i``: the same over groups of 4^i blocks, for the few that lie where the order of the
+* ``SHIFTED``: likewise over blocks shifted by half a block, for candidates that straddle a border.
+* ``SHIFTED + i``: likewise over groups of 4^i blocks, for the few candidates where the order of the
   blocks leaps, until one group is left.
 
-So the result is that of one fixed sequence, however many threads run it, and no edge is frozen at a
-border. Independent sets by rounds [Luby 1986] cost 4 to 10 times the work and were dropped.
+So the result is that of one fixed sequence, however many threads run it, and no edge is skipped
+because it lies at a border. Independent sets by rounds [Luby 1986] cost 4 to 10 times the work and were
+dropped.
 
-A candidate list is one array with a slot range a face block; a stage sets what it has dealt with to
-``DONE``.
+A list of candidates is one array with a range of slots per face block. A stage sets each candidate that
+it has dealt with to ``DONE``.
 """
 
 from __future__ import annotations
@@ -44,16 +45,16 @@ SHIFTED = 1
 
 DONE = -1
 
-# Faces in a block. Smaller blocks balance better over threads, larger ones have fewer edges across
-# borders; below 1.5 blocks a mesh is one block and has no border.
+# Faces per block. Smaller blocks balance better over threads, larger ones have fewer edges across
+# borders. A mesh of less than 1.5 blocks is one block and has no border.
 FACES_PER_BLOCK = 12288
 
 
 def make_blocks(mesh: Mesh) -> Blocks:
-    """Cut faces into even ranges and vertices into the ranges that these faces own.
+    """Cut faces into even ranges, and vertices into the ranges that these faces own.
 
-    In the order that `split` and `order` leave, vertices follow the half-edge that owns them. Range k
-    of the vertices then belongs to range k of the faces; what does not fit is left to later stages.
+    In the order that `split` and `morton` leave, vertices follow the half-edges that own them, so range
+    k of the vertices belongs to range k of the faces. Edges that do not fit are left to later stages.
     """
     n_faces = mesh.origin.size // 3
     n_vertices = mesh.vertex_halfedge.size
@@ -69,7 +70,7 @@ def make_blocks(mesh: Mesh) -> Blocks:
 
 
 def _first_owned(mesh: Mesh, start: int, missing: int) -> int:
-    """Vertex of the first half-edge from ``start`` on that owns one."""
+    """Return the vertex of the first half-edge from ``start`` on that owns one."""
     step = 64
     while start < mesh.origin.size:
         h = np.arange(start, min(start + step, mesh.origin.size))
@@ -82,7 +83,7 @@ def _first_owned(mesh: Mesh, start: int, missing: int) -> int:
 
 
 def stages(blocks: Blocks) -> tuple[int, ...]:
-    """Stages that a mesh of so many blocks needs; a single block owns everything."""
+    """Return the stages that a mesh of so many blocks needs; a single block owns everything."""
     last = OWNED
     while _group(last) < len(blocks.face) - 1:
         last += 1
@@ -90,30 +91,30 @@ def stages(blocks: Blocks) -> tuple[int, ...]:
 
 
 def per_block(mesh: Mesh, blocks: Blocks, *_: Any) -> int:
-    """Pieces of a loop over blocks."""
+    """Return the number of blocks: one piece of a threaded loop each."""
     return len(blocks.face) - 1
 
 
 def per_stage_block(mesh: Mesh, blocks: Blocks, stage: int, *_: Any) -> int:
-    """Pieces of a loop over the blocks of a stage, or its groups of blocks."""
+    """Return the number of blocks, or groups of them, in a stage: one piece of a threaded loop each."""
     count = len(blocks.face) - 1
     return count - 1 if stage == SHIFTED else -(-count // _group(stage))
 
 
 def _group(stage: int) -> int:
-    """Blocks in a group."""
+    """Return the number of blocks in a group."""
     return 1 if stage <= SHIFTED else 1 << 2 * (stage - SHIFTED)
 
 
 @inlined
 def vertex_range(blocks, stage, k):
-    """Vertices that block ``k`` of a stage may touch."""
+    """Return the first and the end of the vertices that block ``k`` of a stage may touch."""
     return _stage_range(blocks.vertex, stage, k)
 
 
 @inlined
 def face_range(blocks, stage, k):
-    """Faces that block ``k`` of a stage may remove and make."""
+    """Return the first and the end of the faces that block ``k`` of a stage may remove and make."""
     return _stage_range(blocks.face, stage, k)
 
 
@@ -127,7 +128,7 @@ def _stage_range(ends, stage, k):
 
 @inlined
 def list_range(blocks, stage, k):
-    """Candidate lists (first, end) that block ``k`` of a stage reads."""
+    """Return the first and the end of the candidate lists that block ``k`` of a stage reads."""
     if stage == SHIFTED:
         return np.int64(k), np.int64(k) + 2
     return _groups(blocks.face.size - 1, stage, k)

@@ -1,10 +1,11 @@
-"""Readers of ``Mesh.curve``: what the number on a half-edge says of its edge.
+"""Readers of ``Mesh.curve``, the number on a half-edge that tells which curve its edge lies on.
 
-``NONE`` is an edge off all feature curves. A number from 0 up names a half-edge of the reference on the
-same curve; `NON_MANIFOLD` is added to it where more sheets than two, or two of the same direction, meet.
-`FROZEN` and `HALTED` edges are locked: never split, collapsed or flipped.
+An edge off all feature curves has ``NONE``. A number from 0 up is the name of a curve: a half-edge of the
+reference on it. A non-manifold edge, where three or more faces meet, or two that run it in the same
+direction, has `NON_MANIFOLD` added to its name. `FROZEN` and `HALTED` edges are locked: never split,
+collapsed or flipped.
 
-All take one number, in kernels, or an array of them.
+Each reader takes one number, in kernels, or an array of numbers.
 """
 
 from __future__ import annotations
@@ -41,5 +42,5 @@ def is_non_manifold(curve):
 
 @shared
 def curve_name(curve):
-    """Name the curve of an edge that is on one and not locked: a half-edge of the reference."""
+    """Return the name of the curve of an edge that has one (`is_named`): a half-edge of the reference."""
     return curve & (NON_MANIFOLD - 1)

@@ -1,4 +1,4 @@
-"""Edges of bare faces, and what they connect; in NumPy and SciPy, for what is not in the inner loops."""
+"""Edges of bare faces, and the components that they connect; NumPy and SciPy, outside the inner loops."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..core.vocabulary import IntArray
 
-__all__ = ["components", "edge_keys", "halfedge_ends", "unique_edges"]
+__all__ = ["components", "count_edges", "edge_keys", "halfedge_ends", "unique_edges"]
 
 
 def halfedge_ends(F: NDArray[Any]) -> NDArray[Any]:
@@ -18,13 +18,19 @@ def halfedge_ends(F: NDArray[Any]) -> NDArray[Any]:
 
 
 def edge_keys(ends: NDArray[Any], n: int) -> IntArray:
-    """One number per edge, whichever way it runs, from its ends (2, ...) among n vertices."""
+    """Return a number per edge, the same in both directions, from its ends (2, ...) among n vertices."""
     return np.minimum(*ends).astype(np.int64) * n + np.maximum(*ends)
 
 
 def unique_edges(F: NDArray[Any]) -> NDArray[Any]:
     """Return every edge once, (k, 2), the smaller vertex first, in ascending order."""
     return np.unique(np.sort(halfedge_ends(F), axis=0), axis=1).T
+
+
+def count_edges(F: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
+    """Return every edge once, as `unique_edges` does, and how many faces have it."""
+    edges, uses = np.unique(np.sort(halfedge_ends(F), axis=0), axis=1, return_counts=True)
+    return edges.T, uses
 
 
 def components(n: int, a: NDArray[Any], b: NDArray[Any]) -> tuple[int, NDArray[np.int32]]:

@@ -1,9 +1,9 @@
-"""The half-edge mesh on flat arrays: build from faces, walk, compact, extract.
+"""Build the half-edge mesh on flat arrays from faces.
 
 Half-edge ``h = 3 f + c`` runs from corner ``c`` of face ``f`` to the next corner. The one-ring of
-``v`` is walked counter-clockwise from ``vertex_halfedge[v]`` by ``twin[previous(h)]``. For a boundary
-vertex the walk starts at the outgoing half-edge without twin and ends at a missing twin, so one loop
-serves both kinds; every operation keeps it so in O(1).
+``v`` is walked counter-clockwise from ``vertex_halfedge[v]`` with `next_spoke`. At a boundary vertex the
+walk starts at the outgoing half-edge without twin and ends at a missing twin, so one loop serves both
+kinds of vertices. Every operation keeps this invariant in O(1).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 from ..core.compiler import kernel
 from ..core.vocabulary import CURVE, INNER, NONE, FloatArray, IndexArray, Mesh
 from .twins import PINCHED, Defects, match_halfedges
-from .walk import next_halfedge, previous_halfedge
+from .walk import next_halfedge, next_spoke
 
-__all__ = ["Defects", "build_mesh", "next_halfedge", "previous_halfedge"]
+__all__ = ["build_mesh"]
 
 
 def build_mesh(
@@ -23,8 +23,8 @@ def build_mesh(
 ) -> tuple[Mesh, Defects, IndexArray]:
     """Connect faces to a manifold half-edge mesh.
 
-    Edges with more than two faces or two equally directed ones are cut open; a vertex that holds
-    several fans becomes one vertex a fan.
+    Edges with more than two faces, or with two that run them in the same direction, are cut open. A
+    vertex that holds several fans becomes one vertex per fan.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ def build_mesh(
     Returns
     -------
     mesh : Mesh
-        Boundary edges are curves, all else is free.
-    found : BuildReport
+        Boundary edges are curves; all other edges are free.
+    found : Defects
     source : (k,) int32
         Row of ``X`` for every vertex of the mesh.
     """
@@ -71,42 +71,37 @@ def build_mesh(
 def _split_pinched(mesh: Mesh) -> tuple[Mesh, IndexArray, int]:
     """Give every fan at a pinched vertex a vertex of its own.
 
-    Returns the mesh, the vertices that the new ones are copies of, and how many corners in fans of
-    two faces there are.
+    Returns the mesh, the vertices that the new ones are copies of, and the number of corners in fans of
+    two faces.
     """
     n = len(mesh.kind)
     corners = np.flatnonzero((mesh.kind == PINCHED)[mesh.origin])
     source = np.empty(len(corners), np.int32)
-    first, excess = (
-        np.concatenate([part, source]) for part in (mesh.vertex_halfedge, mesh.valence_excess)
+    roomy = mesh._replace(
+        vertex_halfedge=np.concatenate([mesh.vertex_halfedge, source]),
+        valence_excess=np.concatenate([mesh.valence_excess, source]),
+        kind=np.concatenate([mesh.kind, np.zeros(len(corners), np.uint8)]),
     )
-    kind = np.concatenate([mesh.kind, np.zeros(len(corners), np.uint8)])
     visited = np.zeros(mesh.origin.size, np.bool_)
-    count, doubled = _split_fans(
-        corners,
-        mesh.origin,
-        mesh.twin,
-        mesh.vertex_halfedge.size,
-        visited,
-        first,
-        excess,
-        kind,
-        source,
-    )
+    count, doubled = _split_fans(roomy, n, corners, visited, source)
     source = source[: count - n]
     split = mesh._replace(
-        vertex_halfedge=first[:count],
-        valence_excess=excess[:count],
+        vertex_halfedge=roomy.vertex_halfedge[:count],
+        valence_excess=roomy.valence_excess[:count],
         X=np.concatenate([mesh.X, mesh.X[source]]),
-        kind=kind[:count],
+        kind=roomy.kind[:count],
         birth=np.zeros(count, np.int32),
     )
     return split, source, int(doubled)
 
 
 @kernel
-def _split_fans(corners, origin, twin, n, visited, first, excess, kind, source):
-    """Give fans numbers, by their first half-edges; the first of a vertex keeps its own."""
+def _split_fans(mesh, n, corners, visited, source):
+    """Give numbers to all fans, in the order of ``corners``; the first fan of a vertex keeps its number.
+
+    ``mesh`` has room for new vertices behind the first ``n``.
+    """
+    origin, twin, kind = mesh.origin, mesh.twin, mesh.kind
     count = n
     doubled = 0
     for h in corners:
@@ -131,12 +126,12 @@ def _split_fans(corners, origin, twin, n, visited, first, excess, kind, source):
             origin[g] = new
             size += 1
             last = max(last, g)
-            g = np.int64(twin[previous_halfedge(g)])
+            g = next_spoke(twin, g)
             if g == NONE or g == start:
                 break
         is_open = twin[start] == NONE
-        first[new] = start if is_open else last
-        excess[new] = size - (3 if is_open else 6)
+        mesh.vertex_halfedge[new] = start if is_open else last
+        mesh.valence_excess[new] = size - (3 if is_open else 6)
         kind[new] = CURVE if is_open else INNER
         doubled += 2 * (size == 2 and not is_open)
     return count, doubled

@@ -1,10 +1,10 @@
 """Morton order: neighbours in space become neighbours in the arrays.
 
-The largest single gain at 640,000 faces, 2 to 3 times even on one thread, because every phase reads
-one-rings; the blocks of `edge_sets` rest on it too.
+At 640,000 faces it makes everything 2 to 3 times faster, even on one thread, because every phase reads
+one-rings. No other change gained as much. The blocks of `mesh.blocks` rely on it too.
 
-Threads get ranges of faces. Nothing in the result depends on where these are cut: keys are unique, so
-they have one order, and vertices are numbered by their first use in it.
+Threads get ranges of faces. The result does not depend on where these are cut: keys are unique, so they
+have one order, and vertices are numbered by their first use in it.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from ..core.vocabulary import FloatArray, IndexArray, IntArray
 __all__ = ["MeshFrame", "Ordered", "order_mesh", "survey"]
 
 
-# Bits of the curve by which keys are counted, to cut them into even groups: of 1024 cells in space, a
-# surface meets 100 to 300.
+# Keys are counted by so many bits of the curve, to cut them into even groups. A surface meets 100 to 300
+# of the 1024 cells in space.
 _CELL_BITS = 10
 
 
 class MeshFrame(NamedTuple):
-    """Where a mesh lies, and the coordinates that all else uses: ``(V - centre) * scale``."""
+    """Bounding box of a mesh, and the frame of all further coordinates: ``(V - centre) * scale``."""
 
     low: FloatArray  # (3,) corners of the bounding box, in units of V
     high: FloatArray
@@ -37,24 +37,43 @@ class MeshFrame(NamedTuple):
 
 
 class Ordered(NamedTuple):
-    """A mesh in Morton order, without unreferenced vertices, and where its elements came from."""
+    """A mesh in Morton order, without unreferenced vertices, and the origin of its elements."""
 
     X: FloatArray  # (n, 4)
     F: IndexArray  # (m, 3)
-    vertex_source: IndexArray  # (n,)
-    face_source: IndexArray  # (m,)
+    vertex_source: IndexArray  # (n,) row in V
+    face_source: IndexArray  # (m,) row in the faces before
+
+
+class _Grid(NamedTuple):
+    """How centroids become positions on the curve, and these become keys."""
+
+    centre: FloatArray  # (3,), as in `MeshFrame`
+    scale: float
+    low: FloatArray  # (3,), three times the lower corner of the box
+    step: float  # cells of the grid per unit of the sum of three corners
+    index_bits: int  # the low bits of a key, which hold the index of the face
+    shift: int  # the bits of a key below those by which keys are counted
+
+
+class _RangeVertices(NamedTuple):
+    """The vertices that each range of faces uses."""
+
+    number: IndexArray  # (ranges, n), from 1 in the order of first use, 0 for none
+    listed: IndexArray  # (ranges, n), in this order
+    size: IntArray  # (ranges,)
 
 
 def survey(
     V: FloatArray, F: NDArray[Any], parallel: bool
 ) -> tuple[IndexArray, FloatArray, FloatArray, int]:
-    """Return the faces as int32, the box around their vertices, and how many repeat a corner."""
+    """Return the faces as int32, the box (low, high) around them, and how many repeat a corner."""
     cuts = even_ranges(len(F), parallel)
     faces = np.empty((len(F), 3), np.int32)
     boxes = np.empty((len(cuts) - 1, 6))
     repeated = np.empty(len(cuts) - 1, np.int64)
     _survey(parallel, cuts, V, F, faces, boxes, repeated)
-    # Adding 0 turns -0 to 0: which of the two a minimum returns would depend on the cuts.
+    # Adding 0 turns -0 into 0. Otherwise the cuts would decide which of the two a minimum returns.
     low, high = boxes[:, :3].min(axis=0) + 0.0, boxes[:, 3:].max(axis=0) + 0.0
     return faces, low, high, int(repeated.sum())
 
@@ -70,7 +89,7 @@ def order_mesh(
     F : (m, 3) int32
     parallel : bool
         Let threads share the work; the result is the same.
-    frame : Frame, optional
+    frame : MeshFrame, optional
         By default, coordinates stay as they are.
     """
     if frame is None:
@@ -81,38 +100,25 @@ def order_mesh(
     n, ranges = len(V), len(cuts) - 1
     faces, face_source = np.empty((len(F), 3), np.int32), np.empty(len(F), np.int32)
     X, vertex_source = np.empty((n, 4)), np.empty(n, np.int32)
-    numbers, listed = np.zeros((ranges, n), np.int32), np.empty((ranges, n), np.int32)
-    sizes = np.empty(ranges, np.int64)
-    _number_vertices(
-        parallel, cuts, F, keys, index_bits, numbers, listed, sizes, faces, face_source
+    vertices = _RangeVertices(
+        np.zeros((ranges, n), np.int32), np.empty((ranges, n), np.int32), np.empty(ranges, np.int64)
     )
-    owned = sizes
+    _number_vertices(parallel, cuts, F, keys, index_bits, vertices, faces, face_source)
+    owned = vertices.size
     if ranges > 1:
         owned = np.empty(ranges, np.int64)
-        _claim_vertices(parallel, cuts, numbers, listed, sizes, owned)
+        _claim_vertices(parallel, cuts, vertices, owned)
     starts = owned.cumsum() - owned
-    _place_faces(
-        parallel,
-        cuts,
-        V,
-        frame.centre,
-        frame.scale,
-        numbers,
-        listed,
-        sizes,
-        starts,
-        X,
-        vertex_source,
-    )
+    _place_vertices(parallel, cuts, V, frame, vertices, starts, X, vertex_source)
     if ranges > 1:
-        _rename(parallel, cuts, numbers, listed, sizes, faces)
+        _renumber_corners(parallel, cuts, vertices, faces)
     n = int(owned.sum())
     return Ordered(X[:n], faces, vertex_source[:n], face_source)
 
 
 @threaded(per_range)
 def _survey(span, cuts, V, F, faces, boxes, repeated):
-    """Cast faces; find the box around the corners of each range, and how many faces repeat one."""
+    """Cast faces; find the box around each range, and count the faces that repeat a corner."""
     for k in range(span[0], span[1]):
         low_x, low_y, low_z = np.inf, np.inf, np.inf
         high_x, high_y, high_z = -np.inf, -np.inf, -np.inf
@@ -138,9 +144,9 @@ def _survey(span, cuts, V, F, faces, boxes, repeated):
 def _sorted_keys(
     V: FloatArray, F: IndexArray, parallel: bool, cuts: IntArray, frame: MeshFrame
 ) -> tuple[NDArray[np.uint64], int]:
-    """Return a key a face, its index in the low bits, in order; and how many bits the index has."""
+    """Return one key per face, in order, with its index in the low bits; and how many bits that has."""
     index_bits = max(1, (len(F) - 1).bit_length())
-    # What the index leaves of 63 bits goes to the curve, at most 20 bits an axis.
+    # The curve gets the bits that the index leaves of 63, at most 20 per axis.
     bits = min(20, (63 - index_bits) // 3)
     low = (frame.low - frame.centre) * frame.scale
     extent = float(((frame.high - frame.centre) * frame.scale - low).max())
@@ -148,14 +154,12 @@ def _sorted_keys(
     shift = max(index_bits, 3 * bits + index_bits - _CELL_BITS)
     keys = np.empty(len(F), np.uint64)
     counts = np.zeros((len(cuts) - 1, 1 << _CELL_BITS if parallel else 0), np.int64)
-    _fill_keys(
-        parallel, cuts, V, F, frame.centre, frame.scale, 3.0 * low, scale / 3.0, index_bits, shift, keys,
-        counts,
-    )  # fmt: skip
+    grid = _Grid(frame.centre, frame.scale, 3.0 * low, scale / 3.0, index_bits, shift)
+    _fill_keys(parallel, cuts, V, F, grid, keys, counts)
     if not parallel:
         keys.sort()
         return keys, index_bits
-    # Groups of cells that hold about as many keys each, as many as there are ranges.
+    # As many groups of cells as there are ranges, with about the same number of keys each.
     ends = counts.sum(axis=0).cumsum()
     group = np.searchsorted(cuts[1:-1], ends - 1, side="right")
     by_group = np.zeros((len(cuts) - 1, len(cuts) - 1), np.int64)
@@ -183,19 +187,24 @@ _SPREAD = _spread_table()
 
 
 @threaded(per_range)
-def _fill_keys(span, cuts, V, F, centre, scale, low, third, index_bits, shift, keys, counts):
-    """Curve position in the high bits, face index in the low ones; counts by cell, where asked."""
-    x0, y0, z0 = centre[0], centre[1], centre[2]
-    up, down = np.uint64(index_bits), np.uint64(shift)
+def _fill_keys(span, cuts, V, F, grid, keys, counts):
+    """Write keys: curve position in the high bits, face index in the low ones.
+
+    Counts keys per cell, unless ``counts`` has no columns.
+    """
+    x0, y0, z0 = grid.centre[0], grid.centre[1], grid.centre[2]
+    x1, y1, z1 = grid.low[0], grid.low[1], grid.low[2]
+    scale, step = grid.scale, grid.step
+    up, down = np.uint64(grid.index_bits), np.uint64(grid.shift)
     for k in range(span[0], span[1]):
         for f in range(cuts[k], cuts[k + 1]):
             a, b, c = F[f, 0], F[f, 1], F[f, 2]
             x = (V[a, 0] - x0) * scale + (V[b, 0] - x0) * scale + (V[c, 0] - x0) * scale
             y = (V[a, 1] - y0) * scale + (V[b, 1] - y0) * scale + (V[c, 1] - y0) * scale
             z = (V[a, 2] - z0) * scale + (V[b, 2] - z0) * scale + (V[c, 2] - z0) * scale
-            code = _spread_bits((x - low[0]) * third)
-            code |= _spread_bits((y - low[1]) * third) << np.uint64(1)
-            code |= _spread_bits((z - low[2]) * third) << np.uint64(2)
+            code = _spread_bits((x - x1) * step)
+            code |= _spread_bits((y - y1) * step) << np.uint64(1)
+            code |= _spread_bits((z - z1) * step) << np.uint64(2)
             key = (code << up) | np.uint64(f)
             keys[f] = key
             if counts.shape[1] > 0:
@@ -224,15 +233,16 @@ def _scatter(span, cuts, keys, shift, group, starts, grouped):
 
 
 @threaded(per_range)
-def _number_vertices(span, cuts, F, keys, index_bits, numbers, listed, sizes, faces, face_source):
+def _number_vertices(span, cuts, F, keys, index_bits, vertices, faces, face_source):
     """Put faces in order; list the vertices of each range by first use, and number them from 1."""
+    numbers, listed = vertices.number, vertices.listed
     mask = (np.uint64(1) << np.uint64(index_bits)) - np.uint64(1)
     for k in range(span[0], span[1]):
         for i in range(cuts[k], cuts[k + 1]):
             f = np.int64(keys[i] & mask)
             face_source[i] = f
             faces[i, 0], faces[i, 1], faces[i, 2] = F[f, 0], F[f, 1], F[f, 2]
-        # A loop of its own, so that branches that nobody can predict wait for nothing from afar.
+        # In a loop of its own, so that the unpredictable branch below does not wait for distant memory.
         count = 0
         for i in range(cuts[k], cuts[k + 1]):
             for c in range(3):
@@ -242,15 +252,16 @@ def _number_vertices(span, cuts, F, keys, index_bits, numbers, listed, sizes, fa
                     count += 1
                     numbers[k, v] = count
                 faces[i, c] = numbers[k, v] - 1
-        sizes[k] = count
+        vertices.size[k] = count
 
 
 @threaded(per_range)
-def _claim_vertices(span, cuts, numbers, listed, sizes, owned):
-    """Leave vertices to the first range that lists them, and mark them as ``-1 - v`` in others."""
+def _claim_vertices(span, cuts, vertices, owned):
+    """Leave each vertex to the first range that lists it, and mark it as ``-1 - v`` in the others."""
+    numbers, listed = vertices.number, vertices.listed
     for k in range(span[0], span[1]):
-        owned[k] = sizes[k]
-        for s in range(sizes[k]):
+        owned[k] = vertices.size[k]
+        for s in range(vertices.size[k]):
             v = listed[k, s]
             for j in range(k):
                 if numbers[j, v] > 0:
@@ -260,11 +271,13 @@ def _claim_vertices(span, cuts, numbers, listed, sizes, owned):
 
 
 @threaded(per_range)
-def _place_faces(span, cuts, V, centre, scale, numbers, listed, sizes, starts, X, vertex_source):
-    """Write the vertices that a range owns; ``numbers`` then counts through all ranges."""
+def _place_vertices(span, cuts, V, frame, vertices, starts, X, vertex_source):
+    """Write the vertices that a range owns; their numbers then count through all ranges."""
+    numbers, listed = vertices.number, vertices.listed
+    centre, scale = frame.centre, frame.scale
     for k in range(span[0], span[1]):
         i = starts[k]
-        for s in range(sizes[k]):
+        for s in range(vertices.size[k]):
             v = np.int64(listed[k, s])
             if v >= 0:
                 vertex_source[i] = v
@@ -277,10 +290,11 @@ def _place_faces(span, cuts, V, centre, scale, numbers, listed, sizes, starts, X
 
 
 @threaded(per_range)
-def _rename(span, cuts, numbers, listed, sizes, faces):
+def _renumber_corners(span, cuts, vertices, faces):
     """Give the corners of a range the numbers that count through all ranges."""
+    numbers, listed = vertices.number, vertices.listed
     for k in range(max(1, span[0]), span[1]):
-        for s in range(sizes[k]):
+        for s in range(vertices.size[k]):
             v = np.int64(listed[k, s])
             v = v if v >= 0 else -1 - v
             j = 0

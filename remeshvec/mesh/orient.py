@@ -1,8 +1,8 @@
 """Consistent winding: neighbouring faces run their common edge in opposite directions.
 
-The usual walk over the surface (for example ``bfs_orient`` of libigl), with two rules of its own: only
-edges that exactly two faces share are crossed, and in each component the majority keeps its winding.
-Volume decides nothing: a closed part whose faces point inwards stays so.
+A breadth-first walk over the surface, as in ``bfs_orient`` of libigl, with two additional rules: it
+crosses only edges that exactly two faces share, and the majority of each component keeps its winding.
+Volume plays no part: a closed component whose faces point inwards stays so.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ _UNSEEN = -1
 
 
 def orient_faces(F: IndexArray, n: int) -> tuple[IndexArray, BoolArray]:
-    """Give faces that share an edge with nobody else the same winding.
+    """Give the same winding to the two faces of every edge that has exactly two.
 
-    In each component (faces connected through edges of exactly two faces) the winding of most of its
-    faces stays, or that of its first face where there are as many of both. Edges of three faces and
-    more impose nothing.
+    In each component (faces connected through edges of exactly two faces) most faces keep their winding;
+    where there are as many of both, the first face keeps its own. Edges of three or more faces impose
+    nothing.
 
-    A component without orientation, like a Möbius strip, is oriented along a breadth-first tree from
-    its first face. The edges that remain inconsistent are those where the two ways around meet: on a
-    Möbius strip one line, across the strip or once around it. Which ones they are does not depend on
-    the windings before.
+    A component that is not orientable, like a Möbius strip, is oriented along a breadth-first tree from
+    its first face. Edges remain inconsistent where the two ways around meet: on a Möbius strip along one
+    line, across the strip or once around it. Which edges these are does not depend on the windings of
+    the input.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def orient_faces(F: IndexArray, n: int) -> tuple[IndexArray, BoolArray]:
     Returns
     -------
     F : (m, 3) int32
-        The faces with corners 1 and 2 of the flipped ones swapped; F itself where none is flipped.
+        The faces, with corners 1 and 2 of the flipped ones swapped; F itself if none is flipped.
     flipped : (m,) bool
-        Which faces were flipped.
+        Which faces are flipped.
     """
     corners = np.ascontiguousarray(F).reshape(-1)
     pairs = match_halfedges(corners, n, False, by_winding=False)
@@ -59,7 +59,7 @@ def orient_faces(F: IndexArray, n: int) -> tuple[IndexArray, BoolArray]:
 
 @kernel
 def _turn_faces(corners, mate, turned):
-    """Mark the faces to flip: as a breadth-first tree says, then all others if these are fewer."""
+    """Mark the faces that a breadth-first tree says to flip, or all others if these are fewer."""
     n_faces = turned.size
     turned[:] = _UNSEEN
     queue = np.empty(n_faces, np.int32)
@@ -77,8 +77,8 @@ def _turn_faces(corners, mate, turned):
             f = np.int64(queue[head])
             head += 1
             count += np.int64(turned[f])
-            # Around the face from corner 0 towards the smaller of the others: an order that a flip
-            # does not change, so that the tree of a component is the same for all its windings.
+            # Around the face from corner 0 towards the smaller of the others: a flip does not change
+            # this order, so the tree of a component is the same for all its windings.
             backwards = corners[3 * f + 1] > corners[3 * f + 2]
             for k in range(3):
                 h = 3 * f + (2 - k if backwards else k)

@@ -1,4 +1,4 @@
-"""Dirt in the input: faces and vertices that a manifold mesh cannot have, found and handled."""
+"""Dirt in the input: find and mend faces and vertices that a manifold mesh cannot have."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.vocabulary import FloatArray, IntArray
+from ..core.vocabulary import FloatArray, IndexArray
 
 __all__ = [
-    "count_edges",
     "count_used",
     "drop_degenerate_faces",
     "drop_duplicate_faces",
@@ -18,34 +17,27 @@ __all__ = [
     "weld_vertices",
 ]
 
-Faces = NDArray[np.int32]
 Indices = NDArray[np.intp]
 
-# Of y and z in the sums that tell points apart.
+# Weights of y and z in the sums that tell points apart.
 _WEIGHTS = 0.7320508075688772, 0.23606797749978969
 
 
-def count_edges(F: IntArray) -> tuple[IntArray, NDArray[np.intp]]:
-    """Return the edges (k, 2), smaller end first, in order, and how many faces have each."""
-    edges = np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]])
-    return np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
-
-
-def count_used(F: Faces, n: int) -> int:
-    """Count those of ``n`` vertices that a face uses."""
+def count_used(F: IndexArray, n: int) -> int:
+    """Count how many of ``n`` vertices are used by a face."""
     used = np.zeros(n, np.bool_)
     used[F.ravel()] = True
     return int(np.count_nonzero(used))
 
 
-def drop_degenerate_faces(F: Faces) -> Indices | None:
-    """Return the faces with three different corners; None where all have them."""
+def drop_degenerate_faces(F: IndexArray) -> Indices | None:
+    """Return the faces with three different corners; None if all have them."""
     bad = (F[:, 0] == F[:, 1]) | (F[:, 1] == F[:, 2]) | (F[:, 2] == F[:, 0])
     return np.flatnonzero(~bad) if bad.any() else None
 
 
-def drop_duplicate_faces(F: Faces, candidates: NDArray[Any] | None = None) -> Indices | None:
-    """Return the first of all faces with the same corners in any order; None where all differ.
+def drop_duplicate_faces(F: IndexArray, candidates: NDArray[Any] | None = None) -> Indices | None:
+    """Return the first of all faces with the same corners in any order; None if all differ.
 
     Only ``candidates`` (all by default) may be duplicates.
     """
@@ -61,8 +53,8 @@ def drop_duplicate_faces(F: Faces, candidates: NDArray[Any] | None = None) -> In
     return np.flatnonzero(kept)
 
 
-def weld_vertices(V: FloatArray, candidates: NDArray[Any]) -> NDArray[np.int32] | None:
-    """Map candidates with the same coordinates to the first of them; None where all differ.
+def weld_vertices(V: FloatArray, candidates: NDArray[Any]) -> IndexArray | None:
+    """Map candidates with the same coordinates to the first of them; None if all differ.
 
     Returns
     -------
@@ -72,9 +64,9 @@ def weld_vertices(V: FloatArray, candidates: NDArray[Any]) -> NDArray[np.int32] 
     return weld_points(V[candidates], candidates, len(V))
 
 
-def weld_points(points: FloatArray, candidates: NDArray[Any], n: int) -> NDArray[np.int32] | None:
+def weld_points(points: FloatArray, candidates: NDArray[Any], n: int) -> IndexArray | None:
     """Weld candidates among ``n`` vertices by their coordinates (k, 3), as `weld_vertices` does."""
-    # One number a point sorts 5 times faster than three, and few different points have the same.
+    # One number per point sorts 5 times faster than three, and few different points have the same one.
     x, y, z = points.T
     sums = x + _WEIGHTS[0] * y + _WEIGHTS[1] * z
     order = np.argsort(sums)

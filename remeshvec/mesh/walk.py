@@ -31,5 +31,5 @@ def next_spoke(twin, h):
 
 
 def ends_of(origin: NDArray[Any], h: NDArray[Any]) -> NDArray[Any]:
-    """Return the vertices where half-edges start and end, (2, k), from their numbers (k,)."""
+    """Return the vertices (2, k) where the half-edges ``h`` (k,) start and end."""
     return origin[np.stack([h, h - h % 3 + (h + 1) % 3])]

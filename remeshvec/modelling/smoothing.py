@@ -12,8 +12,7 @@ from ..core.arguments import choice, count, flag, number
 from ..core.check import as_mask, as_mesh
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
-from ..mesh.edges import components, halfedge_ends
-from ..mesh.repair import count_edges
+from ..mesh.edges import components, count_edges, halfedge_ends
 from .laplacians import AREAS, Area, cotangent_matrix, vertex_areas
 from .solver import LaplacianSolver
 
