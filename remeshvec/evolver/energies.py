@@ -9,8 +9,8 @@ With N = (x1 - x0) x (x2 - x0), the doubled area vector of a face:
   ``(N . a) q / (24 |a|^2)`` with ``q = u0^2 + u1^2 + u2^2 + u0 u1 + u1 u2 + u2 u0``, exact on flat faces
   [Brakke 1992, section 3].
 
-Second derivatives are taken along given directions at the vertices: three of them for all of space, one
-for normal motions.
+Second derivatives are taken along given directions at the vertices: three per vertex for arbitrary
+motions, one for normal motions.
 """
 
 from __future__ import annotations
@@ -20,18 +20,31 @@ import scipy.sparse as sp
 
 from ..core.vocabulary import FloatArray, IntArray
 
-__all__ = ["Potential", "areas", "gradients", "hessian", "potentials", "volumes"]
+__all__ = [
+    "Potential",
+    "areas",
+    "double_area_vectors",
+    "gradients",
+    "hessian",
+    "potentials",
+    "volumes",
+]
 
 Potential = FloatArray  # (3,) gradient a of the fluid's potential energy density, or zeros
 
-# Sign of the derivative along corner i, then corner j: d2N = x_i' x x_j' for j after i.
+# Sign of the second derivative by corners i and j: d2N = x_i' x x_j' if j comes after i.
 _SIGN = np.array([[0.0, 1.0, -1.0], [-1.0, 0.0, 1.0], [1.0, -1.0, 0.0]])
-_THIRD = ((0, 2, 1), (2, 1, 0), (1, 0, 2))  # the corner that is neither
+_THIRD = ((0, 2, 1), (2, 1, 0), (1, 0, 2))  # the corner that is neither i nor j
+
+
+def double_area_vectors(T: FloatArray) -> FloatArray:
+    """Doubled area vectors (m, 3) of triangles (m, 3, 3)."""
+    return np.asarray(np.cross(T[:, 1] - T[:, 0], T[:, 2] - T[:, 0]))
 
 
 def areas(T: FloatArray) -> FloatArray:
     """Areas of triangles (m, 3, 3)."""
-    return np.asarray(0.5 * np.linalg.norm(_doubled(T), axis=1))
+    return np.asarray(0.5 * np.linalg.norm(double_area_vectors(T), axis=1))
 
 
 def volumes(T: FloatArray) -> FloatArray:
@@ -40,16 +53,16 @@ def volumes(T: FloatArray) -> FloatArray:
 
 
 def potentials(T: FloatArray, a: Potential) -> FloatArray:
-    """Part of every face (m, 3, 3) in the integral of ``a . x`` over the volume."""
+    """Contributions of triangles (m, 3, 3) to the integral of ``a . x`` over the volume."""
     if not a.any():
         return np.zeros(len(T))
     u = T @ a
-    return np.asarray((_doubled(T) @ a) * _quadratic(u) / (24.0 * (a @ a)))
+    return np.asarray((double_area_vectors(T) @ a) * _quadratic(u) / (24.0 * (a @ a)))
 
 
 def gradients(T: FloatArray, a: Potential) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Gradients (m, 3, 3) of area, volume and potential with respect to the corners."""
-    N, e = _doubled(T), _opposite(T)
+    N, e = double_area_vectors(T), _opposite(T)
     unit = N / np.maximum(np.linalg.norm(N, axis=1), np.finfo(float).tiny)[:, None]
     area = 0.5 * np.cross(e, unit[:, None])
     volume = np.cross(np.roll(T, -1, axis=1), np.roll(T, 1, axis=1)) / 6.0
@@ -82,7 +95,7 @@ def hessian(
     a : (3,) float64
     tension : float
     pressure : (m,) float64
-        Of every face.
+        Per face.
 
     Returns
     -------
@@ -91,14 +104,14 @@ def hessian(
     """
     T, d = X[F], directions.shape[1]
     D = directions[F]  # (m, 3, d, 3)
-    N, e = _doubled(T), _opposite(T)
+    N, e = double_area_vectors(T), _opposite(T)
     size = np.maximum(np.linalg.norm(N, axis=1), np.finfo(float).tiny)
     unit = N / size[:, None]
     dN = np.cross(D, e[:, :, None])
     along = np.einsum("ficx,fx->fic", dN, unit)
     blocks = np.einsum("ficx,fjdx->ficjd", dN, dN) - np.einsum("fic,fjd->ficjd", along, along)
     blocks *= (0.5 * tension / size)[:, None, None, None, None]
-    # What is linear in d2N: of area, volume and potential.
+    # The terms that are linear in d2N: those of area, volume and potential.
     weight = 0.5 * tension * unit
     gravity = bool(a.any())
     if gravity:
@@ -126,14 +139,11 @@ def hessian(
     return sp.csr_array(sp.coo_array((blocks.ravel(), (rows, columns)), (n, n)))
 
 
-def _doubled(T: FloatArray) -> FloatArray:
-    return np.asarray(np.cross(T[:, 1] - T[:, 0], T[:, 2] - T[:, 0]))
-
-
 def _opposite(T: FloatArray) -> FloatArray:
-    """Edge opposite to each corner, from the corner after the next to the next."""
+    """Edge opposite each corner: from the corner before it to the corner after it."""
     return np.roll(T, -1, axis=1) - np.roll(T, 1, axis=1)
 
 
 def _quadratic(u: FloatArray) -> FloatArray:
+    """Return ``q = u0^2 + u1^2 + u2^2 + u0 u1 + u1 u2 + u2 u0`` per face."""
     return np.asarray(0.5 * ((u**2).sum(axis=1) + u.sum(axis=1) ** 2))

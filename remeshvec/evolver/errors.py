@@ -1,4 +1,4 @@
-"""What can go wrong with Surface Evolver."""
+"""The error of runs of Surface Evolver."""
 
 from __future__ import annotations
 
@@ -8,4 +8,4 @@ __all__ = ["EvolverError"]
 
 
 class EvolverError(RemeshvecError, RuntimeError):
-    """Surface Evolver is absent, failed, took too long or wrote nothing; says which."""
+    """Surface Evolver is absent, failed, took too long or wrote no dump; the message says which."""

@@ -29,7 +29,7 @@ _FLOW_STEPS = 4
 # it; unless forces grow, as they do for long where a surface is about to break.
 _SETTLED, _PATIENCE = 1e-5, 3
 
-# Steps of Newton's method at the end, and how often they may lead so far away that the surface has to be
+# Steps of Newton's method at the end, and how often they may lead so far away that the surface must be
 # remeshed.
 _NEWTON_STEPS, _RETURNS = 15, 6
 
@@ -42,7 +42,7 @@ class Frame:
     ----------
     V, F : (n, 3) float64, (m, 3) int64
     length : float
-        Edge length it was remeshed to.
+        The edge length that it was remeshed to.
     energy, residual : float
     components : int
     event : str
@@ -65,11 +65,11 @@ class Evolution:
     Attributes
     ----------
     minimum : Minimum
-        Where it ended.
+        The surface at the end.
     n_cuts : int
-        Necks cut.
+        Number of necks that were cut.
     frames : list of Frame
-        One a sweep, where ``frames=True``.
+        One per sweep with ``frames=True``, else empty.
     history : list of dict
         "length", "energy", "residual", "faces", "components" after every sweep.
     """
@@ -80,7 +80,7 @@ class Evolution:
     history: list[dict[str, float]] = field(default_factory=list)
 
     def __iter__(self) -> Any:
-        """Unpack."""
+        """Unpack into V and F."""
         return iter((self.minimum.V, self.minimum.F))
 
 
@@ -101,8 +101,8 @@ def evolve(
 ) -> Evolution:
     """Minimise the energy of a surface that may stretch, break and be refined on the way.
 
-    For each length in turn: steps of the flow, remeshing, restored volumes, cut necks, until the energy
-    settles; at last Newton's method on the triangles that are there.
+    For each length in turn, sweeps remesh the surface, restore its volumes, let it flow and cut its
+    necks, until the energy settles. Newton's method then finds the minimum on the last triangles.
 
     Parameters
     ----------
@@ -111,23 +111,24 @@ def evolve(
     lengths : sequence of float
         Target edge lengths, usually falling. Near wires with shorter edges the length is graded.
     sweeps : int
-        Most sweeps a length.
+        The most sweeps per length.
     split, collapse : float
-        Edges longer and shorter than these times the length are split and collapsed.
+        Edges longer than ``split`` times the length are split, edges shorter than ``collapse`` times the
+        length are collapsed.
     remeshing : bool
-        Without it the triangles stay as they are, whatever happens to them, and no neck is cut.
+        Without remeshing, the triangles stay as they are, however bad they become, and no neck is cut.
     cut_necks : bool
         Cut necks that have thinned to three edges.
     volume : {"shared", "per_component"}
-        After a cut, whether pieces share their volume (and pressure), or keep what they have.
+        Whether pieces share their volume (and pressure) after a cut, or keep the volumes they have.
     tol : float
         Residual for Newton's method at the end.
     backend : callable
-        What minimises on given triangles: `minimize`, or an `EvolverBackend`.
+        Minimiser on given triangles: `minimize`, or an `EvolverBackend`.
     frames : bool
         Keep the surface after every sweep.
     callback : callable, optional
-        Called with a `Frame` after every sweep; False ends the evolution.
+        Called with a `Frame` after every sweep; if it returns False, the evolution ends.
 
     Returns
     -------
@@ -136,7 +137,7 @@ def evolve(
     Raises
     ------
     OptionError
-        Options that do not exist.
+        A word is unknown, a number is out of range, or an argument has the wrong type.
     """
     factors = _as_factors(split, collapse)
     plan = _Plan(
@@ -189,7 +190,7 @@ class _Plan:
 
 @dataclass
 class _Log:
-    """What is kept of every sweep, and shown to the caller, who may cancel."""
+    """Record of all sweeps; shows every frame to the caller, who may cancel."""
 
     keeps_frames: bool
     callback: FrameCallback | None
@@ -198,7 +199,7 @@ class _Log:
     is_cancelled: bool = False
 
     def note(self, problem: CapillaryProblem, L: float, residual: float, event: str) -> None:
-        """Record a frame."""
+        """Record the surface after a sweep, and call the callback with it."""
         parts, _ = problem.components()
         V, F = problem.V.copy(), problem.F.copy()
         frame = Frame(V, F, L, problem.energy(), residual, parts, event)
@@ -257,7 +258,7 @@ class _Run:
     def finish(self, L: float) -> bool:
         """Run Newton's method; tells whether it found a minimum, or nothing lower.
 
-        From a saddle, where the flow settles as well, it leads away.
+        The flow settles at saddles, too; Newton's method leads away from them.
         """
         if self.is_over():
             return True

@@ -1,7 +1,7 @@
 """Energy, volumes and their derivatives for a whole problem, at any positions of its vertices.
 
-Nothing is checked here: the minimisers call these functions for every trial step. `CapillaryProblem`
-offers the same with checks.
+Nothing is checked here, since the minimisers call these functions for every trial step. The methods of
+`CapillaryProblem` check their arguments.
 """
 
 from __future__ import annotations

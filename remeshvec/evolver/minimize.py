@@ -1,7 +1,7 @@
 """Minimise the energy of a capillary surface at prescribed volumes: a flow, and Newton's method.
 
-Both work with the Lagrangian, energy minus pressure times volume. After every step volumes are restored
-exactly, so the energies of a history can be compared.
+Both work with the Lagrangian, which is energy minus pressure times volume. Every step ends with restored
+volumes, so that the energies of a history can be compared.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from scipy.sparse.linalg import splu
 from ..core.arguments import choice, count, function, number
 from ..core.vocabulary import FloatArray, IntArray
 from ..modelling.solver import LaplacianSolver
+from .energies import double_area_vectors
 from .forces import Forces, body_volumes_at, energy_at, forces_at, hessian_at
 from .problem import CapillaryProblem, as_problem, with_surface
 
@@ -34,24 +35,25 @@ __all__ = [
 METHODS = ("flow", "newton")
 StepCallback = Callable[[int, CapillaryProblem, float, float], object]
 
-# Steps at most, where the caller does not say.
+# The most steps, unless the caller gives a number.
 _MOST_STEPS = {"flow": 200, "newton": 50}
 
-# Halvings of a step before it counts as impossible.
+# A step is halved this many times at most before it counts as impossible.
 _HALVINGS = 12
 
 # Corrections of the volume after a step, each of which squares the error.
 _VOLUME_CORRECTIONS = 20
 _VOLUME_ERROR = 1e-12  # relative
 
-# Added to the diagonal of the stiffness matrix, relative to it: holds components without fixed vertices
-# in place, also those that shrink to nothing.
+# Added to the diagonal of the stiffness matrix, relative to it. It holds components without fixed
+# vertices in place, including those that shrink to nothing.
 _GAUGE = 1e-6
 
-# Half cotangent of angles of 1.1 degrees: the metric of faces with smaller ones is noise.
+# Half the cotangent of 1.1 degrees: faces with a smaller angle have a metric that is noise.
 _SLIVER = 25.0
 
-# Shifts of a Hessian that is not positive where it has to be: the first, and the factor between them.
+# Shifts of a Hessian that is not positive where it must be: the first, the factor from one to the next,
+# and how many are tried.
 _FIRST_SHIFT, _SHIFT_FACTOR, _SHIFTS = 1e-3, 8.0, 14
 
 
@@ -62,14 +64,15 @@ class Minimum:
     Attributes
     ----------
     problem : CapillaryProblem
-        The problem with its surface where it ended.
+        The problem with the surface at the end.
     energy, area, volume : float
         Offsets included.
     pressure : (g,) float64
-        Of every body: the Lagrange multiplier of its volume, the derivative of the least energy.
+        Pressure per body: the Lagrange multiplier of its volume, which is the derivative of the least
+        energy by that volume.
     residual : float
-        Root of the mean square of the normal force density on free vertices, energy gradient minus
-        pressure, times the square root of the area over the tension: no unit.
+        Root mean square of the normal force density (energy gradient minus pressure) on free vertices,
+        times the square root of the area, over the tension. It has no unit.
     converged : bool
         The residual is below the tolerance.
     stop : str
@@ -107,7 +110,7 @@ def minimize(
     steps: int | None = None,
     callback: StepCallback | None = None,
 ) -> Minimum:
-    """Move the free vertices to where the energy is least, on the triangles that there are.
+    """Move the free vertices to the least energy, on the given triangles.
 
     Parameters
     ----------
@@ -115,16 +118,17 @@ def minimize(
         Not changed.
     method : {"flow", "newton"}
         "flow": descent with the cotangent Laplacian as the metric [Pinkall and Polthier 1993, section
-        4], robust from any start, linear convergence. "newton": one degree of freedom a vertex, along
-        its normal; the Hessian of the Lagrangian, bordered by the volumes, is shifted until it is
-        positive on all motions that keep them, which its inertia tells; quadratic convergence near a
-        minimum. Triangles do not get better by either: `evolve` remeshes in between.
+        4]. It works from any start and converges linearly. "newton": one degree of freedom per vertex,
+        along its normal. The Hessian of the Lagrangian, bordered by the volumes, is shifted until its
+        inertia shows that it is positive on all motions that keep the volumes; near a minimum it
+        converges quadratically. Neither improves the triangles: `evolve` remeshes in between.
     tol : float
-        Residual at which to stop, see `Minimum`.
+        Residual at which to stop; see `Minimum`.
     steps : int, optional
-        At most so many; by default 200 for the flow and 50 for Newton's method.
+        The most steps; by default 200 for the flow and 50 for Newton's method.
     callback : callable, optional
-        Called as ``callback(step, problem, energy, residual)`` after every step; False ends it.
+        Called as ``callback(step, problem, energy, residual)`` after every step; if it returns False, the
+        minimisation ends.
 
     Returns
     -------
@@ -133,7 +137,7 @@ def minimize(
     Raises
     ------
     OptionError
-        Options that do not exist.
+        The method is unknown, a number is out of range, or an argument has the wrong type.
     """
     as_problem(problem)
     tolerance = number(tol, "tol", above=0.0)
@@ -145,7 +149,17 @@ def minimize(
         return unmoved(problem, "nothing is left")
     if not problem.free.any():
         return unmoved(problem, "all is fixed")
-    now = with_restored_volumes(problem)
+    return _descend(with_restored_volumes(problem), advance, most, tolerance, callback)
+
+
+def _descend(
+    now: CapillaryProblem,
+    advance: Callable[[CapillaryProblem, Forces, FloatArray], FloatArray | None],
+    most: int,
+    tolerance: float,
+    callback: StepCallback | None,
+) -> Minimum:
+    """Take steps until one of the reasons to stop holds."""
     history: list[dict[str, float]] = []
     pressure, residual = _balance(now, now.forces())
     stop = "all steps done"
@@ -204,9 +218,9 @@ def _minimum(
 
 
 def _normals(problem: CapillaryProblem) -> tuple[FloatArray, FloatArray]:
-    """Return unit normals (n, 3) and areas (n,) of vertices, from the faces around each."""
+    """Return unit normals (n, 3) and areas (n,) of vertices, from the faces around them."""
     T = problem.V[problem.F]
-    N = np.cross(T[:, 1] - T[:, 0], T[:, 2] - T[:, 0]) / 6.0
+    N = double_area_vectors(T) / 6.0
     index = problem.F.ravel()
     each = np.repeat(N, 3, axis=0)
     total = np.stack([np.bincount(index, each[:, c], len(problem.V)) for c in range(3)], axis=1)
@@ -217,7 +231,7 @@ def _normals(problem: CapillaryProblem) -> tuple[FloatArray, FloatArray]:
 
 
 def _balance(problem: CapillaryProblem, forces: Forces) -> tuple[FloatArray, float]:
-    """Pressures that balance the forces best, and what is left of them (see `Minimum.residual`)."""
+    """Return the pressures that balance the forces best, and the residual; see `Minimum`."""
     normal, area = _normals(problem)
     free = np.flatnonzero(problem.free & (area > 0.0))
     weight = 1.0 / np.sqrt(area[free])
@@ -255,7 +269,7 @@ def _corrected(problem: CapillaryProblem, X: FloatArray, directions: FloatArray)
 def _searched(
     problem: CapillaryProblem, step: FloatArray, directions: FloatArray, slack: float
 ) -> FloatArray | None:
-    """Longest of the halved steps that lowers the energy, with the volumes restored."""
+    """Return the vertices after the first halved step that lowers the energy, volumes restored."""
     before = problem.energy()
     size = 1.0
     for _ in range(_HALVINGS):
@@ -271,7 +285,7 @@ def _searched(
 
 
 def _flow_step(problem: CapillaryProblem, forces: Forces, _: FloatArray) -> FloatArray | None:
-    """Step along the gradient in the metric of the surface's own stiffness matrix."""
+    """Step along the gradient, in the metric of the stiffness matrix of the surface."""
     K = _stiffness(problem)
     K = K + _GAUGE * sp.diags_array(K.diagonal())
     solver = LaplacianSolver(problem.tension * K, problem.fixed)
@@ -286,7 +300,7 @@ def _flow_step(problem: CapillaryProblem, forces: Forces, _: FloatArray) -> Floa
 
 
 def _stiffness(problem: CapillaryProblem) -> sp.csc_array:
-    """Stiffness matrix of the surface, in which slivers count as equilateral."""
+    """Stiffness matrix of the surface; slivers count as equilateral."""
     import igl
 
     n, F = len(problem.V), problem.F
@@ -305,7 +319,7 @@ def _stiffness(problem: CapillaryProblem) -> sp.csc_array:
 def _newton_step(
     problem: CapillaryProblem, forces: Forces, pressure: FloatArray
 ) -> FloatArray | None:
-    """Step of normal motions to where the quadratic model of the Lagrangian is stationary."""
+    """Step along the normals to the stationary point of the quadratic model of the Lagrangian."""
     normal, area = _normals(problem)
     free = np.flatnonzero(problem.free & (area > 0.0))
     H = hessian_at(problem, problem.V, normal[:, None], pressure)[free][:, free]
@@ -320,7 +334,7 @@ def _newton_step(
         return None
     step = np.zeros_like(problem.V)
     step[free] = u[:, None] * normal[free]
-    # Near the minimum energies differ by rounding only; there the step is right by itself.
+    # Near the minimum, energies differ by rounding only; there the step is right without a search.
     small = np.abs(u).max() < 1e-5 * np.sqrt(area.sum())
     return _searched(problem, step, forces.volume, 1e-13 if small else 0.0)
 
@@ -328,7 +342,7 @@ def _newton_step(
 def _gauge(
     problem: CapillaryProblem, normal: FloatArray, area: FloatArray, free: NDArray[np.intp]
 ) -> FloatArray:
-    """Return the translations (k, 3 c) of components without any fixed vertex: no force holds these."""
+    """Return the translations (k, 3 c) of the c components that no fixed vertex holds."""
     _, part = problem.components()
     held = np.unique(part[problem.fixed[problem.F].any(axis=1)])
     columns = []
@@ -349,8 +363,8 @@ def _constrained(
 ) -> FloatArray | None:
     """Solve the bordered system, with H shifted until it is positive where the border vanishes.
 
-    The bordered matrix has as many negative eigenvalues as the border has columns, and no more, if and
-    only if H is positive there; they are counted in the factor of H and in its Schur complement.
+    H is positive there if and only if the bordered matrix has exactly as many negative eigenvalues as the
+    border has columns. They are counted in the factor of H and in its Schur complement.
     """
     scale = problem.tension / problem.area()
     shift = 0.0
@@ -372,7 +386,7 @@ def _constrained(
 
 
 def _factored(A: sp.csc_array) -> tuple[Callable[[FloatArray], FloatArray] | None, int]:
-    """Factor a symmetric matrix with pivots on its diagonal; also counts its negative eigenvalues."""
+    """Factor a symmetric matrix with pivots on its diagonal, and count its negative eigenvalues."""
     try:
         factor = splu(A, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
     except RuntimeError:

@@ -1,7 +1,7 @@
 """Cut necks: closed curves of three or four edges are split, and both ends capped.
 
-Where a neck thins, remeshing collapses the short edges around it until three are left; the link
-condition forbids to collapse these. They are the place where the surface breaks.
+Where a neck thins, remeshing collapses the short edges around it until three are left, which the link
+condition keeps from collapsing. There the surface breaks.
 """
 
 from __future__ import annotations
@@ -23,17 +23,25 @@ __all__ = ["Cut", "cut_necks"]
 
 Cycle = tuple[int, ...]
 
-# A piece counts as hanging on a neck if its area is so many times that of the cap. Less is the base of a
+# A piece hangs on a neck if its area is at least this many times that of the cap. Less is the base of a
 # cone, or a vertex with three faces.
 _SHORTEST_PIECE = 8.0
 
 
 class Cut(NamedTuple):
-    """A surface after its necks were cut."""
+    """A surface after its necks were cut.
+
+    Attributes
+    ----------
+    V, F : (n, 3) float64, (m, 3) int64
+    source : (n,) int64
+        The vertex of the input that each vertex comes from.
+    n_cuts : int
+    """
 
     V: FloatArray
     F: IntArray
-    source: IntArray  # (n,) vertex of the input of every vertex
+    source: IntArray
     n_cuts: int
 
 
@@ -87,7 +95,7 @@ def _next_cycle(V: FloatArray, F: IntArray, held: BoolArray, perimeter: float) -
 
 
 def _cycles(F: IntArray, held: BoolArray, n: int, longest: int) -> list[Cycle]:
-    """Cycles of three edges that are no face, and of four without a diagonal."""
+    """Cycles of three edges that are not a face, and of four without a diagonal."""
     edges = unique_edges(F)
     edges = edges[~held[edges].any(axis=1)]
     both = np.concatenate([edges, edges[:, ::-1]])
@@ -118,7 +126,7 @@ def _cycles(F: IntArray, held: BoolArray, n: int, longest: int) -> list[Cycle]:
 
 
 def _is_neck(V: FloatArray, F: IntArray, cycle: Cycle) -> bool:
-    """Tell whether something large hangs on both sides, or the same on both (a handle)."""
+    """Tell whether a large piece hangs on each side, or one on both (a handle)."""
     side = _side(F, cycle)
     if side is None:
         return False
@@ -148,9 +156,9 @@ def _reached(F: IntArray, seeds: IntArray, cycle: Cycle) -> BoolArray:
 
 
 def _side(F: IntArray, cycle: Cycle) -> IntArray | None:
-    """Faces at the corners of a cycle that lie on its left, walking along it; None if it has no sides.
+    """Faces around the vertices of a cycle that lie on its left; None if it has no sides.
 
-    At each corner they are the fan between the edge that comes and the edge that goes on.
+    At each vertex they are the fan between the outgoing and the incoming edge of the cycle.
     """
     after = {}
     for corner in range(3):
@@ -161,11 +169,11 @@ def _side(F: IntArray, cycle: Cycle) -> IntArray | None:
     faces = []
     for i, v in enumerate(cycle):
         came, goes = cycle[i - 1], cycle[(i + 1) % len(cycle)]
-        # Faces around v run counterclockwise: from the edge that goes on to the one that came.
+        # Counterclockwise around v, from the outgoing to the incoming edge.
         w, steps = goes, 0
         while w != came:
             if (v, w) not in after or steps > len(after):
-                return None  # a boundary between
+                return None  # a boundary lies between
             f, w = after[v, w]
             faces.append(f)
             steps += 1
@@ -175,18 +183,18 @@ def _side(F: IntArray, cycle: Cycle) -> IntArray | None:
 def _split(
     V: FloatArray, F: IntArray, source: IntArray, cycle: Cycle
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Give the faces on the left of a cycle corners of their own there, and cap both sides."""
+    """Give the faces on the left of a cycle their own copies of its vertices, and cap both sides."""
     side, ring = _side(F, cycle), list(cycle)
     copies = len(V) + np.arange(len(ring))
     new = np.arange(len(V))
     new[ring] = copies
     F = F.copy()
     F[side] = new[F[side]]
-    # Half-edges of the faces on the left run along the cycle, and so against it in their cap.
+    # Half-edges of the faces on the left run along the cycle, so those of their cap run against it.
     caps = [_fan(tuple(copies.tolist()[::-1])), _fan(cycle)]
     return np.concatenate([V, V[ring]]), np.concatenate([F, *caps]), np.append(source, source[ring])
 
 
 def _fan(cycle: Cycle) -> IntArray:
-    """Triangles that fill a cycle, from its first vertex."""
+    """Fan of triangles that fills a cycle, from its first vertex."""
     return np.array([(cycle[0], b, c) for b, c in pairwise(cycle[1:])])

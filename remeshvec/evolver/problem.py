@@ -13,7 +13,7 @@ from ..core.arguments import choice, instance, number
 from ..core.check import as_array, as_indices, as_mask, as_mesh, as_numbers, which
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
-from ..mesh.edges import components, count_edges, halfedge_ends
+from ..mesh.edges import components, count_edges, halfedge_ends, used_vertices
 from .energies import areas, volumes
 from .forces import Forces, body_volumes_at, energy_at, forces_at, hessian_at
 
@@ -26,10 +26,10 @@ class CapillaryProblem:
     """A capillary surface: the energy to be minimised, the volume to be kept, and the wires.
 
     The energy is ``tension * area + energy of the fluid in gravity + energy_offset``. The fluid fills
-    the inside of the surface; its energy is ``-density * gravity . x`` integrated over that, as a surface
-    integral that is exact on flat triangles. For a surface that is not closed, area, volume and energy
-    are those of its faces, as seen from the origin; the missing part (flat caps that do not move, say) is
-    a constant, which the offsets add.
+    the inside of the surface; its energy is the integral of ``-density * gravity . x`` over the inside,
+    computed as a surface integral that is exact on flat triangles. For a surface that is not closed,
+    area, volume and energy are those of its faces, as seen from the origin. The missing part (flat caps
+    that do not move, say) contributes constants, which the offsets add.
 
     Parameters
     ----------
@@ -52,23 +52,23 @@ class CapillaryProblem:
     gravity : (3,) float
         Acceleration.
     bodies : {"shared", "per_component"}
-        Whether the volume is that of all components together (they are connected, as by a pipe, and have
-        one pressure), or whether each keeps its own.
+        "shared": the volume is that of all components together; they have one pressure, as if a pipe
+        connected them. "per_component": each component keeps its own volume.
 
     Attributes
     ----------
     V, F, fixed, fixed_edges, tension, volume, ...
         As given; ``fixed`` is a mask (n,).
     body : (m,) int64
-        The body that every face belongs to.
+        The body of every face.
     targets : (g,) float64
-        Prescribed volume of every body, without the offset; empty where none is prescribed.
+        Prescribed volume of every body, without the offset; empty if none is prescribed.
 
     Raises
     ------
     MeshInputError
-        V and F are not a mesh; or a volume or a density is given, but two faces run an edge the same way,
-        so that nothing has an inside.
+        V and F are not a mesh; or a volume or a density is given, but two faces run along an edge in the
+        same direction, so that there is no inside.
     OptionError
         An index is out of range, or a number is not finite or not positive where it must be.
     """
@@ -230,7 +230,7 @@ def _apart(problem: CapillaryProblem) -> tuple[IntArray, FloatArray]:
     count, body = problem.components()
     T = problem.V[problem.F]
     now = np.bincount(body, volumes(T), count)
-    # The difference between what is prescribed and what is there is distributed by area.
+    # The difference between prescribed and present volume is distributed by area.
     missing = problem.targets.sum() - now.sum()
     share = np.bincount(body, areas(T), count)
     return body, now + missing * share / share.sum()
@@ -239,7 +239,7 @@ def _apart(problem: CapillaryProblem) -> tuple[IntArray, FloatArray]:
 def _wires(
     n: int, F: IntArray, fixed: ArrayLike | None, fixed_edges: ArrayLike | None
 ) -> tuple[BoolArray, IntArray]:
-    """Mask of fixed vertices, those that no face uses among them, and the fixed edges."""
+    """Return a mask of fixed vertices, including those that no face uses, and the fixed edges."""
     if fixed_edges is None:
         edges, uses = count_edges(F)
         edges = edges[uses == 1]
@@ -247,19 +247,19 @@ def _wires(
         edges = _as_edges(fixed_edges, n)
     mask = np.zeros(n, np.bool_) if fixed is None else as_mask(fixed, n, "fixed", "vertex")
     mask[edges] = True
-    mask |= np.bincount(F.ravel(), minlength=n) == 0
+    mask |= ~used_vertices(F, n)
     return mask, edges
 
 
 def _check_winding(F: IntArray) -> None:
-    """Refuse faces that run an edge the same way: there is no inside then."""
+    """Refuse faces that run along an edge in the same direction: then there is no inside."""
     start, end = halfedge_ends(F)
     key = start * (F.max() + 1) + end
     _, index, count = np.unique(key, return_index=True, return_counts=True)
     bad = np.unique(index[count > 1] // 3)
     if len(bad):
         raise MeshInputError(
-            f"{which(bad, 'face')} of F run an edge the same way as another, so that no volume is "
+            f"{which(bad, 'face')} of F run along an edge the same way as another, so that no volume is "
             "enclosed; remesh turns them where the surface is a manifold"
         )
 

@@ -1,4 +1,4 @@
-"""Between two minimisations: remesh the surface, cut its necks, drop what is too small for a triangle."""
+"""Changes between two minimisations: remesh the surface, cut its necks, drop its crumbs."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def remeshed(
 
 
 def _graded(problem: CapillaryProblem, L: float) -> float | FloatArray:
-    """Target lengths: L, but near wires the length of these, so that no wire has to be split."""
+    """Target lengths: L, but at wires the length of their edges, so that no wire must be split."""
     edges = problem.fixed_edges
     if not len(edges):
         return L
@@ -75,7 +75,7 @@ def _inner_wires(problem: CapillaryProblem) -> IntArray | None:
 
 
 def with_cut_necks(problem: CapillaryProblem, L: float) -> tuple[CapillaryProblem, int]:
-    """Cut the necks that are as thin as the edge length L allows; also counts them."""
+    """Cut necks of three edges, and those of four with a perimeter up to 2 L; also counts them."""
     found = cut_necks(problem.V, problem.F, problem.fixed, perimeter=2.0 * L)
     if not found.n_cuts:
         return problem, 0
@@ -86,7 +86,7 @@ def with_cut_necks(problem: CapillaryProblem, L: float) -> tuple[CapillaryProble
 
 
 def without_crumbs(problem: CapillaryProblem, L: float) -> CapillaryProblem:
-    """Drop components without wires that are smaller than a triangle; without any, the same problem."""
+    """Drop small components without wires; returns the problem itself if there are none."""
     _, part = problem.components()
     held = np.unique(part[problem.fixed[problem.F].any(axis=1)])
     size = np.abs(np.bincount(part, volumes(problem.V[problem.F])))

@@ -1,7 +1,7 @@
 """Surface Evolver [Brakke 1992] as a backend: datafiles, dumps, and runs of the real program.
 
-Written for version 2.70. The program is a subprocess with a scratch directory for a home, a script for
-its commands, and a time limit.
+Written for version 2.70. The program runs as a subprocess with a scratch directory as its home, a script
+of commands, and a time limit.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from .problem import CapillaryProblem, as_problem, with_surface
 
 __all__ = ["EvolverBackend", "read_dump", "write_fe"]
 
-# Steps at most, where the caller does not say.
+# Steps, unless the caller gives a number.
 _EVOLVER_STEPS = {"flow": 10, "newton": 8}
 
-# Gradient steps before Newton steps are tried, and those that count as a step of the flow.
+# Gradient steps before Newton steps are tried, and gradient steps per step of the flow.
 _WARM_UP, _GRADIENT_STEPS = 5, 20
 
 _SECTION = re.compile(r"^(vertices|edges|faces|facets|bodies|read)\b", re.IGNORECASE | re.MULTILINE)
@@ -44,14 +44,21 @@ _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 def write_fe(path: str | Path, problem: CapillaryProblem) -> Path:
     """Write a problem as a datafile of Surface Evolver.
 
-    Fixed vertices and wires are marked so. A body holds the faces, with the prescribed volume, the offset
-    as its ``volconst``, and its density. The gravity constant is always written, since 1 is the default;
-    surfaces that are not closed have ``symmetric_content``, so that the volume means the same.
+    Fixed vertices and wires are marked ``fixed``. A body lists its faces, the prescribed volume, the
+    offset as its ``volconst``, and the density. The gravity constant is always written, since its default
+    is 1. With ``symmetric_content``, the volume of a surface that is not closed means the same as here.
+
+    Parameters
+    ----------
+    path : str or path
+    problem : CapillaryProblem
 
     Raises
     ------
+    MeshFormatError
+        The file cannot be written.
     OptionError
-        Gravity along another axis than -z: Surface Evolver has no other.
+        Gravity has a component across the z axis, which Surface Evolver does not have.
     """
     as_problem(problem)
     file = Path(as_path(path, "path"))
@@ -80,7 +87,7 @@ def _bodies(problem: CapillaryProblem) -> list[str]:
     lines = ["bodies"]
     for g in range(max(1, len(problem.targets))):
         faces = " ".join(str(f + 1) for f in np.flatnonzero(problem.body == g))
-        # The offset belongs to the only body; of several none is known to have it.
+        # The offset belongs to the only body. Of several bodies, it is not known which has it.
         offset = problem.volume_offset if len(problem.targets) < 2 else 0.0
         volume = f" volume {float(problem.targets[g]) + offset!r}" if len(problem.targets) else ""
         density = f" density {problem.density!r}" if problem.density else ""
@@ -89,7 +96,7 @@ def _bodies(problem: CapillaryProblem) -> list[str]:
 
 
 def _numbered_edges(F: IntArray) -> tuple[IntArray, IntArray]:
-    """Edges (k, 2), and of every face the numbers of its three, from 1, negative where it runs back."""
+    """Edges (k, 2), and the numbers of the three edges of every face: from 1, negative if reversed."""
     start, end = halfedge_ends(F)
     edges, index = np.unique(np.sort([start, end], axis=0), axis=1, return_inverse=True)
     sign = np.where(start < end, 1, -1)
@@ -150,7 +157,7 @@ def _corners_of(
 
 
 def _records(section: str) -> dict[int, list[str]]:
-    """Words of every line, by the number in front."""
+    """Words of every line, by the number at its start."""
     rows = (line.split() for line in section.splitlines())
     return {int(row[0]): row[1:] for row in rows if row and row[0].isdigit()}
 
@@ -163,23 +170,23 @@ def _is_plain_number(words: list[str]) -> bool:
 
 
 class EvolverBackend:
-    """Minimise with Surface Evolver; may be given to `evolve` in place of the native solver.
+    """Minimise with Surface Evolver; serves `evolve` in place of the native solver.
 
-    Called like `minimize`. "flow" is its gradient descent with an optimising scale (``g``), "newton" its
-    ``hessian`` after some of these and a step of scale 0, which restores volumes. Where the energy rises,
-    or Newton steps fail, gradient steps are taken instead.
+    Called like `minimize`. "flow" is its gradient descent with an optimising scale (``g``). "newton" is
+    its ``hessian`` after a step of scale 0, which restores volumes. Where the energy rises or Newton
+    steps fail, gradient steps come first, or take their place.
 
     Parameters
     ----------
     executable : str
         Name or path of the program; Debian's package is ``evolver-nox``.
     timeout : float
-        Seconds that a run may take.
+        The most seconds per run.
 
     Raises
     ------
     EvolverError
-        The program is not there.
+        The program is not installed.
     """
 
     def __init__(self, executable: str | Path = "evolver", timeout: float = 120.0) -> None:
@@ -215,7 +222,7 @@ class EvolverBackend:
         return result
 
     def _lowered(self, problem: CapillaryProblem, scripts: list[str]) -> CapillaryProblem:
-        """Run scripts until one does not raise the energy; the last one counts in any case."""
+        """Run scripts until one does not raise the energy; the result of the last one always counts."""
         before = with_restored_volumes(problem).energy()
         for script in scripts[:-1]:
             try:
@@ -234,7 +241,7 @@ class EvolverBackend:
         Raises
         ------
         EvolverError
-            The program failed, took too long or wrote no dump; with what it printed last.
+            The program failed, took too long or wrote no dump; the message ends with its last output.
         """
         V, F, _ = self.run_freely(problem, script)
         if len(V) != len(problem.V) or len(F) != len(problem.F):
@@ -245,12 +252,12 @@ class EvolverBackend:
     def run_freely(
         self, problem: CapillaryProblem, script: str
     ) -> tuple[FloatArray, IntArray, BoolArray]:
-        """Run commands that may refine or remove triangles; returns what `read_dump` does.
+        """Run commands that may refine or remove triangles; returns V, F and fixed, as `read_dump`.
 
         Raises
         ------
         EvolverError
-            As `run`.
+            As for `run`.
         """
         as_problem(problem)
         if not text(script, "script").isascii():
@@ -294,7 +301,7 @@ class EvolverBackend:
 
 
 def _scripts(method: str, steps: int) -> list[str]:
-    """Commands to try, in this order, until the energy does not rise."""
+    """Scripts to try in this order, until one does not raise the energy."""
     if method == "flow":
         return [f"g {_GRADIENT_STEPS * steps};"]
     # A step of scale 0 restores the volumes, which `hessian` expects.

@@ -7,9 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.vocabulary import IntArray
+from ..core.vocabulary import BoolArray, FloatArray, IntArray
 
-__all__ = ["components", "count_edges", "edge_keys", "halfedge_ends", "unique_edges"]
+__all__ = [
+    "components",
+    "count_edges",
+    "edge_keys",
+    "halfedge_ends",
+    "lengths_in_triangles",
+    "unique_edges",
+    "used_vertices",
+]
 
 
 def halfedge_ends(F: NDArray[Any]) -> NDArray[Any]:
@@ -31,6 +39,18 @@ def count_edges(F: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
     """Return every edge once, as `unique_edges` does, and how many faces have it."""
     edges, uses = np.unique(np.sort(halfedge_ends(F), axis=0), axis=1, return_counts=True)
     return edges.T, uses
+
+
+def used_vertices(F: NDArray[Any], n: int) -> BoolArray:
+    """Mask of those of n vertices that a face uses."""
+    is_used = np.zeros(n, np.bool_)
+    is_used[F.ravel()] = True
+    return is_used
+
+
+def lengths_in_triangles(T: FloatArray) -> FloatArray:
+    """Lengths (m, 3) of the edges of triangles (m, 3, 3)."""
+    return np.asarray(np.linalg.norm(T - np.roll(T, 1, axis=1), axis=2))
 
 
 def components(n: int, a: NDArray[Any], b: NDArray[Any]) -> tuple[int, NDArray[np.int32]]:

@@ -1,4 +1,4 @@
-"""Edit a surface by a handle: displacements solve ``Delta^k d = 0`` between handle and fixed parts."""
+"""Edit a surface by a handle: displacements solve ``Delta^k d = 0`` between handle and fixed part."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..core.arguments import choice, count
 from ..core.check import as_array, as_mask, as_mesh, which
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
+from ..mesh.edges import used_vertices
 from .fairing import HIGHEST_ORDER, Polyharmonic
 from .laplacians import AREAS, Area
 
@@ -32,7 +33,7 @@ def deform(
 ) -> FloatArray:
     """Move a handle, hold some vertices, and let the others follow smoothly.
 
-    One `Editor` and one `Editor.move`; see there.
+    Makes an `Editor` and calls `Editor.move` once. Parameters and errors are theirs.
 
     Returns
     -------
@@ -43,13 +44,13 @@ def deform(
 
 
 class Editor:
-    """Deform a surface again and again with the same handle: the system is factored once.
+    """Deform a surface many times with the same handle: the system is factored once.
 
-    The displacement d of the support, which is all that is neither handle nor fixed, solves ``Delta^k d
-    = 0`` [Botsch and Kobbelt 2004, An intuitive framework for real-time freeform modeling, sections 3
-    and 4]. Where handle and fixed part are k rings wide, the surface stays smooth of order k - 1 across
-    their borders. Displacements are added in space: details of the surface are carried along but do not
-    turn with it; `MultiresolutionEditor` turns them.
+    The support consists of the vertices that are neither in the handle nor fixed. Its displacement d
+    solves ``Delta^k d = 0`` [Botsch and Kobbelt 2004, An intuitive framework for real-time freeform
+    modeling, sections 3 and 4]. If handle and fixed part are k rings wide, the surface stays smooth of
+    order k - 1 across their borders. Details of the surface move with it but do not turn with it;
+    `MultiresolutionEditor` turns them.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ class Editor:
     handle, fixed : (k,) int or (n,) bool
         Vertices that are moved, and vertices that stay. They must not overlap.
     k : {1, 2, 3}
-        1: membrane, 2: thin plate, 3: minimal variation of curvature.
+        Order; 1: membrane, 2: thin plate, 3: minimal variation of curvature.
     area : {"voronoi", "uniform"}
         See `vertex_areas`.
 
@@ -71,9 +72,10 @@ class Editor:
     Raises
     ------
     MeshInputError
-        V and F are no mesh, or faces of the support have no area.
+        V and F are not a mesh, or faces of the support have no area.
     OptionError
-        Handle and fixed part overlap, leave nothing between them, or do not exist.
+        Handle and fixed part overlap or leave no support, the handle is empty, an index is out of range,
+        or the order or the area is not allowed.
     SingularSystemError
         A component of the mesh has neither handle nor fixed vertices.
 
@@ -101,20 +103,25 @@ class Editor:
         self._basis: FloatArray | None = None
 
     def move(self, transform: Transform) -> FloatArray:
-        """Return the surface with its handle moved from where it is at rest.
+        """Return the surface with its handle moved from its place at rest.
 
         Parameters
         ----------
         transform : (4, 4) or (3, 4) float, (h, 3) float, or callable
             An affine map as a matrix for column vectors; or the new positions of the handle's vertices,
-            in the order of their indices; or a function from the old ones (h, 3) to these. After the
-            first of them, affine maps need no solve: they are linear in four solutions [the same,
+            in the order of their indices; or a function from the old positions (h, 3) to the new ones.
+            Affine maps are linear in four solutions, so only the first one needs a solve [the same,
             section 4].
 
         Returns
         -------
         (n, 3) float64
-            Vertices; fixed ones are those of ``V``, bit for bit.
+            Vertices; fixed ones are as in ``V``, bit for bit.
+
+        Raises
+        ------
+        OptionError
+            The transform has a wrong shape, is not affine, or is not finite.
         """
         affine, target = as_transform(transform, self.V[self.handle])
         if affine is None:
@@ -128,7 +135,7 @@ class Editor:
         return moved
 
     def _affine_basis(self) -> FloatArray:
-        """Solutions (n, 4) with the handle's coordinates, and with 1, at the handle."""
+        """Solutions (n, 4) for the coordinates of the handle, and for 1 at the handle."""
         if self._basis is None:
             values = np.zeros((len(self.V), 4))
             values[self.handle] = np.column_stack([self.V[self.handle], np.ones(self.handle.sum())])
@@ -138,7 +145,7 @@ class Editor:
 
 @dataclass(frozen=True)
 class Region:
-    """A mesh whose vertices are in the handle, fixed, or in the support between them."""
+    """A mesh, and which of its vertices are in the handle, fixed, or in the support."""
 
     V: FloatArray
     F: IntArray
@@ -148,7 +155,7 @@ class Region:
 
     @classmethod
     def of(cls, V: ArrayLike, F: ArrayLike, handle: ArrayLike, fixed: ArrayLike) -> Region:
-        """Check and copy; vertices that no face uses count as fixed."""
+        """Check and copy the arrays; vertices that no face uses count as fixed."""
         vertices, faces = as_mesh(V, F)
         n = len(vertices)
         is_handle = as_mask(handle, n, "handle", "vertex")
@@ -158,7 +165,7 @@ class Region:
             raise OptionError(f"{which(both, 'vertex')} are in the handle and fixed; choose one")
         if not is_handle.any():
             raise OptionError("handle is empty: there is nothing to move")
-        is_fixed |= (np.bincount(faces.ravel(), minlength=n) == 0) & ~is_handle
+        is_fixed |= ~(used_vertices(faces, n) | is_handle)
         support = ~(is_handle | is_fixed)
         if not support.any():
             raise OptionError("all vertices are in the handle or fixed: none is left to follow")
@@ -167,14 +174,14 @@ class Region:
     def polyharmonic(
         self, V: FloatArray, k: int, area: Area, length: float | None = None
     ) -> Polyharmonic:
-        """Return the system of the support, with its vertices at V; checks order and areas."""
+        """Return the system of the support, with vertices at V; checks the order and the area."""
         order = count(k, "k", high=HIGHEST_ORDER)
         choice(area, "area", AREAS)
         return Polyharmonic(V, self.F, self.support, order, area, length)
 
 
 def as_transform(transform: Transform, points: FloatArray) -> tuple[FloatArray | None, FloatArray]:
-    """Return the affine map (3, 4), if it is one, and where it takes the points."""
+    """Return the affine map (3, 4), or None if it is not one, and the new places of the points."""
     value = transform(points.copy()) if callable(transform) else transform
     array = as_array(value, "transform")
     if array.dtype.kind not in "fiu" or not np.isfinite(array).all():

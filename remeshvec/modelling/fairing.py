@@ -1,4 +1,4 @@
-"""Fair surfaces: ``Delta^k x = 0`` in a region, continuous of order k - 1 with what is around it."""
+"""Fair surfaces: ``Delta^k x = 0`` in a region, which joins its surroundings with continuity C^(k-1)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from ..core.arguments import choice, count
 from ..core.check import as_mask, as_mesh, which
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
+from ..mesh.edges import used_vertices
 from .laplacians import AREAS, Area, cotangent_matrix, polyharmonic_matrix, vertex_areas
 from .solver import LaplacianSolver
 
@@ -27,9 +28,9 @@ def fair(
     area: Area = "voronoi",
     iterations: int = 1,
 ) -> FloatArray:
-    """Replace a region by the smoothest surface that joins what is around it.
+    """Replace a region by the smoothest surface that joins its surroundings.
 
-    Solves ``Delta^k x = 0`` for the vertices of the region, the k rings around it being fixed [Botsch
+    Solves ``Delta^k x = 0`` for the vertices of the region, with the k rings around it fixed [Botsch
     and Kobbelt 2004, An intuitive framework for real-time freeform modeling, section 3; Kobbelt et al.
     1998]: a membrane (k = 1, joins with C0), a thin plate (2, C1), or the surface of minimal variation
     of curvature (3, C2).
@@ -39,27 +40,27 @@ def fair(
     V : (n, 3) float
     F : (m, 3) int
     region : (r,) int or (n,) bool
-        Vertices that move. Where it is nearer than k rings to a boundary of the mesh, the conditions
-        that are missing there are the natural ones of the energy.
+        Vertices that move. Within k rings of a boundary of the mesh, the natural conditions of the energy
+        replace the missing rings.
     k : {1, 2, 3}
         Order.
     area : {"voronoi", "uniform"}
         See `vertex_areas`.
     iterations : int
-        Solves, each with the Laplacian of the surface that the one before left. The first has that of
-        ``V``. With k = 1 they lead to a minimal surface [Pinkall and Polthier 1993].
+        Number of solves. The first has the Laplacian of ``V``, each later one that of the surface before
+        it. With k = 1 they lead to a minimal surface [Pinkall and Polthier 1993].
 
     Returns
     -------
     (n, 3) float64
-        Vertices; those outside of the region are those of ``V``, bit for bit.
+        Vertices; outside the region they are those of ``V``, bit for bit.
 
     Raises
     ------
     MeshInputError
-        V and F are no mesh, or faces in the region have no area.
+        V and F are not a mesh, or faces in the region have no area.
     OptionError
-        A region, an order or an area that does not exist.
+        The region has an index out of range, or an order, an area or a number is not allowed.
     SingularSystemError
         The region holds a whole component of the mesh.
     """
@@ -80,8 +81,8 @@ class Polyharmonic:
     """The system ``Delta^k x = 0`` at some vertices of a mesh, factored.
 
     With a length it is ``x + (-length^2 Delta)^k x = y``: waves much longer than ``2 pi length`` pass,
-    shorter ones do not [Desbrun et al. 1999, section 4.2]. It is made of the faces around these
-    vertices only.
+    shorter ones do not [Desbrun et al. 1999, section 4.2]. The system contains only the faces around the
+    free vertices.
     """
 
     def __init__(
@@ -94,11 +95,12 @@ class Polyharmonic:
         length: float | None = None,
     ) -> None:
         near = _faces_around(F, free, k - 1)
-        used = np.zeros(len(V), np.bool_)
-        used[F[near]] = True
+        used = used_vertices(F[near], len(V))
         lonely = np.flatnonzero(free & ~used)
         if len(lonely):
-            raise OptionError(f"{which(lonely, 'vertex')} that should move belong to no face of F")
+            raise OptionError(
+                f"{which(lonely, 'vertex')} that should move do not belong to a face of F"
+            )
         self.vertices = np.flatnonzero(used)
         number = np.full(len(V), -1, np.int64)
         number[self.vertices] = np.arange(len(self.vertices))
@@ -113,7 +115,7 @@ class Polyharmonic:
         self.solver = LaplacianSolver(A, ~self._is_free)
 
     def solve(self, values: FloatArray) -> FloatArray:
-        """Return values (n, c) of all vertices with those of the free ones replaced."""
+        """Return values (n, c) at all vertices, with those at free vertices replaced by the solution."""
         result = values.copy()
         given = values[self.vertices]
         found = self.solver.solve(self._pull[:, None] * given, given[~self._is_free])
@@ -122,7 +124,7 @@ class Polyharmonic:
 
 
 def _faces_around(F: IntArray, vertices: BoolArray, rings: int) -> NDArray[np.intp]:
-    """Faces that touch some vertices or so many rings around these."""
+    """Faces that touch some vertices, or as many rings around them as are asked for."""
     reached = vertices.copy()
     for _ in range(rings):
         reached[F[reached[F].any(axis=1)]] = True

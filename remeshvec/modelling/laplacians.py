@@ -1,8 +1,7 @@
 """Discrete Laplacians of triangle meshes: libigl's cotangents over Voronoi or uniform areas.
 
-Sign: that of the analyst's Laplacian, sum of second derivatives; matrices are negative semidefinite.
-Units: the cotangent matrix has none, areas are squared units of V, so the Laplacian has the inverse of
-squared units of V.
+Sign: that of the sum of second derivatives; matrices are negative semidefinite. Units: the cotangent
+matrix has none, areas are in squared units of V, so the Laplacian is in inverse squared units of V.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from ..core.arguments import choice, flag
 from ..core.check import as_mesh, which
 from ..core.vocabulary import FloatArray
 from ..errors import MeshInputError
+from ..mesh.edges import used_vertices
 
 __all__ = ["AREAS", "cotangent_matrix", "laplacian", "polyharmonic_matrix", "vertex_areas"]
 
@@ -35,7 +35,7 @@ def cotangent_matrix(V: ArrayLike, F: ArrayLike) -> sp.csc_array:
     V : (n, 3) float
         Vertices.
     F : (m, 3) int
-        Faces; holes, several components and edges with many faces are all right.
+        Faces; holes, several components and edges with many faces are allowed.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def cotangent_matrix(V: ArrayLike, F: ArrayLike) -> sp.csc_array:
     Raises
     ------
     MeshInputError
-        V and F are no mesh, or a face has no area (the cotangents are infinite).
+        V and F are not a mesh, or a face has no area (the cotangents are infinite).
     """
     import igl
 
@@ -54,27 +54,35 @@ def cotangent_matrix(V: ArrayLike, F: ArrayLike) -> sp.csc_array:
     if not np.isfinite(C.data).all():
         flat = np.flatnonzero(~np.isfinite(igl.cotmatrix_entries(vertices, faces)).all(axis=1))
         raise MeshInputError(
-            f"{which(flat, 'face')} of F have no area, or none but rounding errors, so that cotangents "
-            "are infinite; remesh first, or drop them"
+            f"{which(flat, 'face')} of F have no area, or only that of rounding errors, so that "
+            "cotangents are infinite; remesh first, or drop them"
         )
-    # libigl adds up both halves in different orders.
+    # libigl adds up the two halves in different orders, which breaks the symmetry by rounding errors.
     return sp.csc_array((C + C.T) * 0.5)
 
 
 def vertex_areas(V: ArrayLike, F: ArrayLike, area: Area = "voronoi") -> FloatArray:
-    """Area that belongs to each vertex.
+    """Area of each vertex: its share of the area of the surface.
 
     Parameters
     ----------
     V : (n, 3) float
     F : (m, 3) int
     area : {"voronoi", "uniform"}
-        Mixed Voronoi areas [Meyer et al. 2003, section 3.3], or their mean for all vertices.
+        "voronoi": mixed Voronoi areas [Meyer et al. 2003, section 3.3]. "uniform": their mean, for all
+        vertices.
 
     Returns
     -------
     (n,) float64
         In squared units of V; 0 for vertices that no face uses. They add up to the area of the surface.
+
+    Raises
+    ------
+    MeshInputError
+        V and F are not a mesh.
+    OptionError
+        The area is unknown.
     """
     import igl
 
@@ -82,9 +90,9 @@ def vertex_areas(V: ArrayLike, F: ArrayLike, area: Area = "voronoi") -> FloatArr
     vertices, faces = as_mesh(V, F)
     found = igl.massmatrix(vertices, faces, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
     areas = np.zeros(len(vertices))
-    areas[: len(found)] = found  # libigl leaves out what comes after the last corner
+    areas[: len(found)] = found  # libigl stops at the last vertex that a face uses
     if area == "uniform":
-        is_used = np.bincount(faces.ravel(), minlength=len(vertices)) > 0
+        is_used = used_vertices(faces, len(vertices))
         areas = np.where(is_used, igl.doublearea(vertices, faces).sum() / 2 / is_used.sum(), 0.0)
     return areas
 
@@ -94,8 +102,8 @@ def laplacian(
 ) -> sp.csc_array:
     """Discrete Laplacian ``M^-1 C``: cotangents over vertex areas.
 
-    With ``area="uniform"`` it is symmetric, and close to the one with Voronoi areas where the mesh is
-    even: that is what the surface is remeshed for.
+    With ``area="uniform"`` it is symmetric. On an even mesh, such as a remeshed one, it is close to the
+    Laplacian with Voronoi areas.
 
     Parameters
     ----------
@@ -105,21 +113,21 @@ def laplacian(
         See `vertex_areas`.
     symmetric : bool
         Return ``M^-1/2 C M^-1/2``, which has the same eigenvalues, and eigenvectors ``M^1/2 x``. With
-        uniform areas that is the same matrix.
+        uniform areas it is the same matrix.
 
     Returns
     -------
     (n, n) sparse array
-        With the sign of the sum of second derivatives: negative semidefinite eigenvalues, in inverse
-        squared units of V. ``laplacian(V, F) @ V`` is ``-2 H n``, the mean curvature normal [Meyer et
+        With the sign of the sum of second derivatives: its eigenvalues are at most 0. In inverse squared
+        units of V. ``laplacian(V, F) @ V`` is ``-2 H n``, the mean curvature normal [Meyer et
         al. 2003, section 3.5]. Rows of vertices that no face uses are empty.
 
     Raises
     ------
     MeshInputError
-        As `cotangent_matrix`.
+        As for `cotangent_matrix`.
     OptionError
-        An area that does not exist.
+        The area is unknown, or ``symmetric`` is not True or False.
     """
     is_symmetric = flag(symmetric, "symmetric")
     areas = vertex_areas(V, F, area)
@@ -136,7 +144,7 @@ def laplacian(
 
 
 def polyharmonic_matrix(C: sp.csc_array, areas: FloatArray, k: int) -> sp.csc_array:
-    """Matrix ``C (M^-1 C)^(k-1)`` of the Laplacian of order k, times areas: symmetric for any M.
+    """Laplacian of order k times areas, ``C (M^-1 C)^(k-1)``: symmetric for any M.
 
     Times (-1)^k it is positive semidefinite.
     """
@@ -148,4 +156,5 @@ def polyharmonic_matrix(C: sp.csc_array, areas: FloatArray, k: int) -> sp.csc_ar
 
 
 def _inverse(areas: FloatArray) -> NDArray[Any]:
+    """Inverse areas; 0 where there is no area."""
     return np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0.0)

@@ -1,4 +1,4 @@
-"""Parts of a motion: an affine map by a share w, 0 for none of it and 1 for all."""
+"""Parts of a motion: a share w of an affine map, from 0 (none of it) to 1 (all of it)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..core.vocabulary import FloatArray, IntArray
 
 __all__ = ["part_of_motion", "rotations_between"]
 
-# Radians below which the axis of a screw is too far away to be turned about.
+# Below this angle in radians, the axis of a screw is too far away to turn about.
 _NO_TURN = 1e-6
 
 
@@ -17,9 +17,9 @@ def part_of_motion(
 ) -> FloatArray:
     """Move every point by its own share of an affine map.
 
-    The map is a rotation after a stretch about ``centre`` (polar decomposition), and a translation. The
-    rigid part is a screw motion, of which points go the w-th part along their helix; the stretch is
-    interpolated linearly.
+    The map is a stretch about ``centre``, then a rotation (polar decomposition), then a translation. The
+    rigid part is a screw motion: a point goes the share w of its helix. The stretch is interpolated
+    linearly.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def part_of_motion(
     turns = Rotation.from_rotvec(w[:, None] * omega)
     if angle < _NO_TURN:
         return np.asarray(centre + turns.apply(away) + w[:, None] * shift)
-    # What a shift has across the axis is a turn about a point.
+    # With the part of the shift across the axis, the turn is one about another point.
     axis = omega / angle
     along = axis * (axis @ shift)
     across = shift - along
@@ -56,9 +56,10 @@ def part_of_motion(
 
 
 def rotations_between(P: FloatArray, Q: FloatArray, F: IntArray) -> FloatArray:
-    """Rotation (n, 3, 3) at every vertex from P to Q: the nearest to the mean gradient around it.
+    """Rotation (n, 3, 3) per vertex from P to Q: the nearest to the mean gradient around it.
 
-    Gradients of faces take the unit normal to the unit normal, and count with their area in P.
+    The gradient of a face takes its unit normal in P to that in Q. Gradients are weighted by the areas of
+    the faces in P.
     """
     before, area = _frames(P, F)
     after, _ = _frames(Q, F)
@@ -75,7 +76,7 @@ def rotations_between(P: FloatArray, Q: FloatArray, F: IntArray) -> FloatArray:
 
 
 def _frames(X: FloatArray, F: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Two edges and the unit normal of every face as columns; and twice its area."""
+    """Return two edges and the unit normal per face as columns, and twice its area."""
     a, b = X[F[:, 1]] - X[F[:, 0]], X[F[:, 2]] - X[F[:, 0]]
     normal = np.cross(a, b)
     area = np.linalg.norm(normal, axis=1)

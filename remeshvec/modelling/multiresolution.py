@@ -1,10 +1,10 @@
 """Multiresolution editing: details turn with the smooth base they lie on, and the base is remeshed.
 
-A surface is split into its base, the support made fair, and its details, what the base lacks [Kobbelt
-et al. 1998]. The base follows the handle; where its triangles stretch it is remeshed [Botsch and Kobbelt
-2004, A remeshing approach to multiresolution modeling, section 5]; details are put back, turned as the
-base is turned. New vertices know by their births where on the base at rest they lie, and so where they
-go and which detail is theirs.
+A surface is split into a base, where the support is fair, and details, the difference from the surface
+[Kobbelt et al. 1998]. The base follows the handle, and is remeshed where its triangles stretch [Botsch
+and Kobbelt 2004, A remeshing approach to multiresolution modeling, section 5]. Then the details are added
+again, turned as the base has turned. The birth of a new vertex is its place on the base at rest: it gives
+the displacement and the detail of the vertex.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..core.arguments import flag, number
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
+from ..mesh.edges import lengths_in_triangles
 from ..pipeline.remesh import remesh
 from .editing import Region, Transform, as_transform
 from .laplacians import Area
@@ -26,13 +27,13 @@ from .motion import part_of_motion, rotations_between
 __all__ = ["EditedSurface", "MultiresolutionEditor"]
 
 
-# The base is remeshed where edges of the support leave this range of lengths [the report's thresholds],
-# or an angle falls below so many degrees.
+# The base is remeshed when the length of an edge of the support leaves this range [the report's
+# thresholds], or an angle falls below this number of degrees.
 _SHORT, _LONG = 0.5, 1.5
 _SMALL_ANGLE = 28.0
 
-# How often the base is remeshed in one move: where triangles were long at rest, new vertices come to lie
-# beside the triangles that they were made on.
+# How often the base is remeshed in one move, at most: where triangles were long at rest, new vertices
+# come to lie beside the triangles that they were made on.
 _MOST_REMESHINGS = 4
 
 
@@ -45,13 +46,13 @@ class EditedSurface:
     V : (n, 3) float64
     F : (m, 3) int64
     base : (n, 3) float64
-        The smooth surface under the details.
+        The smooth surface without the details.
     birth_face, birth_barycentric : (n,) int64, (n, 3) float64
-        Where on the surface at rest each vertex lies: face, and weights of its corners.
+        Place of each vertex on the surface at rest: a face, and the weights of its corners.
     support : (n,) bool
         Vertices that are neither handle nor fixed.
     remeshed : int
-        How often the support was remeshed since the surface was at rest.
+        How often the support has been remeshed since the surface was at rest.
     """
 
     V: FloatArray
@@ -63,48 +64,41 @@ class EditedSurface:
     remeshed: int
 
     def __iter__(self) -> Iterator[NDArray[np.generic]]:
-        """Unpack."""
+        """Unpack into V and F."""
         return iter((self.V, self.F))
 
 
 class MultiresolutionEditor:
     """Deform a detailed surface: details turn with it, and stretched triangles are replaced.
 
-    The base of the support goes a share w of the way of the handle, ``Delta^k w = 0`` between 0 at the
-    fixed part and 1 at the handle: of a rigid motion that share of its screw, so that bars bend and
-    twist without getting thinner, by any angle.
+    The base of the support moves by a share w of the motion of the handle, with ``Delta^k w = 0`` between
+    0 at the fixed part and 1 at the handle. The share of a rigid motion is that of its screw, so that
+    bars bend and twist by any angle without getting thinner.
 
     Parameters
     ----------
-    V : (n, 3) float
-    F : (m, 3) int
-    handle, fixed : (k,) int or (n,) bool
-        As in `Editor`. What lies between them is the support.
-    k : {1, 2, 3}
-        Order of the base, and of the way in which it follows.
+    V, F, handle, fixed, k, area
+        As for `Editor`; k is the order of the base, and of the shares.
     detail_size : float, optional
-        Waves of the support shorter than about this, in units of V, are details. By default all that
-        the surface of `fair` lacks: right for a patch, but a long tube has no fair surface with any
-        volume.
+        Waves of the support shorter than about this, in units of V, are details. By default the details
+        are all that `fair` removes: right for a patch, but the fair surface of a long tube has no volume.
     length : float, optional
-        Edge length of the support where it is remeshed, in units of V. By default the mean length of
-        its edges at rest.
+        Edge length to which the support is remeshed, in units of V. By default the mean length of its
+        edges at rest.
     remesh : bool
         Whether to remesh.
-    area : {"voronoi", "uniform"}
-        See `vertex_areas`.
 
     Attributes
     ----------
     base : (n, 3) float64
         The smooth base at rest.
     details : (n, 3) float64
-        What it lacks: ``V - base``.
+        Difference from the surface: ``V - base``.
 
     Raises
     ------
     MeshInputError, OptionError, SingularSystemError
-        As `Editor`; a length that is not positive.
+        As for `Editor`; OptionError also if a length is not positive.
     """
 
     def __init__(
@@ -129,7 +123,8 @@ class MultiresolutionEditor:
             size = number(detail_size, "detail_size", above=0.0, unit="units of V")
             cutoff = size / (2.0 * np.pi)
         if length is None:
-            self._length = _mean_edge_of(self._V[self._F[region.support[self._F].any(axis=1)]])
+            T = self._V[self._F[region.support[self._F].any(axis=1)]]
+            self._length = float(lengths_in_triangles(T).mean())
         else:
             self._length = number(length, "length", above=0.0, unit="units of V")
         self.base = region.polyharmonic(self._V, k, area, cutoff).solve(self._V)
@@ -141,18 +136,18 @@ class MultiresolutionEditor:
         self._now = _Current(self._F, self._handle, fixed_vertices, region.support, *births)
 
     def move(self, *transforms: Transform) -> EditedSurface:
-        """Return the surface with its handle moved from where it is at rest.
+        """Return the surface with its handle moved from its place at rest.
 
         Parameters
         ----------
         *transforms : (4, 4) or (3, 4) float, (h, 3) float, or callable
-            As in `Editor.move`. Several are a path: each goes on from where the one before led, so that
-            four quarter turns are a whole one.
+            As for `Editor.move`. Several are a path: each starts from the result of the one before, so
+            that four quarter turns are a whole one.
 
         Returns
         -------
         EditedSurface
-            The next move goes on with its triangles.
+            The next move starts with its triangles.
         """
         motion = self._motion(transforms)
         now = self._now
@@ -169,7 +164,7 @@ class MultiresolutionEditor:
         )  # fmt: skip
 
     def _motion(self, path: Sequence[Transform]) -> list[_Step]:
-        """Turn the handle's path into what it does to the base."""
+        """Turn the path of the handle into motions of the base."""
         points = self._V[self._handle]
         steps: list[_Step] = []
         for transform in path:
@@ -193,7 +188,7 @@ class MultiresolutionEditor:
         return x + self._at_rest(now, displacement)
 
     def _placed(self, now: _Current, motion: list[_Step]) -> FloatArray:
-        """Move the base."""
+        """Return the base after a motion, at the vertices of now."""
         x = self._at_rest(now, self.base)
         for step in motion:
             x = step(now, x)
@@ -201,13 +196,13 @@ class MultiresolutionEditor:
 
     def _is_stretched(self, now: _Current, base: FloatArray) -> bool:
         T = base[now.F[now.support[now.F].any(axis=1)]]
-        edges = np.linalg.norm(T - np.roll(T, 1, axis=1), axis=2)
+        edges = lengths_in_triangles(T)
         if edges.max() > _LONG * self._length or edges.min() < _SHORT * self._length:
             return True
         return bool(_smallest_angles(T).min() < _SMALL_ANGLE)
 
     def _remeshed(self, now: _Current, base: FloatArray) -> _Current:
-        """Remesh the support; births lead back to the surface at rest."""
+        """Remesh the support; births are places on the surface at rest."""
         held = np.concatenate([now.handle, now.fixed])
         result = remesh(
             base,
@@ -229,7 +224,7 @@ class MultiresolutionEditor:
     def _located(
         self, now: _Current, face: IntArray, weights: FloatArray
     ) -> tuple[IntArray, FloatArray]:
-        """Births on the surface at rest, from those on the surface before remeshing."""
+        """Turn births on the surface before remeshing into births on the surface at rest."""
         if now.remeshed == 0:
             return face.copy(), weights.copy()
         import igl
@@ -241,12 +236,12 @@ class MultiresolutionEditor:
         return born, np.asarray(igl.barycentric_coordinates(closest, a, b, c))
 
     def _at_rest(self, now: _Current, values: FloatArray) -> FloatArray:
-        """Values (n, c) of the surface at rest, at the vertices of now."""
+        """Values (n, c) on the surface at rest, interpolated at the vertices of now."""
         corners = values[self._F[now.birth_face]]
         return np.asarray(np.einsum("vc,vcx->vx", now.birth_barycentric, corners))
 
     def _with_details(self, now: _Current, base: FloatArray) -> FloatArray:
-        """Add the details, turned as the base is turned."""
+        """Add the details, turned as the base has turned."""
         details = self._at_rest(now, self.details)
         turn = rotations_between(self._at_rest(now, self.base), base, now.F)[now.support]
         V = base.copy()
@@ -256,7 +251,7 @@ class MultiresolutionEditor:
 
 @dataclass(frozen=True)
 class _Current:
-    """The triangles that the last move left, and where at rest their vertices lie."""
+    """The triangles after the last move, and the places of their vertices at rest."""
 
     F: IntArray
     handle: NDArray[np.intp]  # in the order at rest
@@ -271,17 +266,12 @@ _Step = Callable[[_Current, FloatArray], FloatArray]
 
 
 def _own_births(n: int, F: IntArray) -> tuple[IntArray, FloatArray]:
-    """Births of vertices on a face of their own; any, for those that no face uses."""
+    """Births at the vertices of a mesh: a face of each and its corner; arbitrary without a face."""
     face, corner = np.zeros(n, np.int64), np.zeros(n, np.int64)
     for c in range(3):
         face[F[:, c]] = np.arange(len(F))
         corner[F[:, c]] = c
     return face, np.eye(3)[corner]
-
-
-def _mean_edge_of(T: FloatArray) -> float:
-    """Mean length of the edges of triangles (m, 3, 3)."""
-    return float(np.linalg.norm(T - np.roll(T, 1, axis=1), axis=2).mean())
 
 
 def _smallest_angles(T: FloatArray) -> FloatArray:

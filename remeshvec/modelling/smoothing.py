@@ -1,4 +1,4 @@
-"""Implicit fairing: steps of mean curvature flow that no step length makes unstable."""
+"""Implicit fairing: steps of mean curvature flow, stable for any step length."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..core.arguments import choice, count, flag, number
 from ..core.check import as_mask, as_mesh
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
-from ..mesh.edges import components, count_edges, halfedge_ends
+from ..mesh.edges import components, count_edges, halfedge_ends, lengths_in_triangles, used_vertices
 from .laplacians import AREAS, Area, cotangent_matrix, vertex_areas
 from .solver import LaplacianSolver
 
@@ -43,12 +43,12 @@ def smooth(
     V : (n, 3) float
     F : (m, 3) int
     step : float, optional
-        Time of a step, in squared units of V. By default the squared mean edge length.
+        Time per step, in squared units of V. By default the squared mean edge length.
     iterations : int
-        Steps.
+        Number of steps.
     keep_volume : bool
-        Scale every component about its centre of area after each step, so that it encloses as much as
-        before [Desbrun et al. 1999, section 3.3]. Only for closed, oriented surfaces.
+        Scale every component about its centre of area after each step, so that it encloses the same
+        volume as before [Desbrun et al. 1999, section 3.3]. Only for closed, oriented surfaces.
     boundary : {"fixed", "free"}
         Whether boundary vertices stay; free ones shrink into the surface, as a soap film would.
     fixed : (k,) int or (n,) bool, optional
@@ -59,15 +59,15 @@ def smooth(
     Returns
     -------
     (n, 3) float64
-        Vertices; those that stay, and those that no face uses, are those of ``V``, bit for bit.
+        Vertices; those that stay, and those that no face uses, are as in ``V``, bit for bit.
 
     Raises
     ------
     MeshInputError
-        V and F are no mesh; a face has no area, or lost it in a step (one vanishing thin part: remesh
-        between steps, or take fewer); ``keep_volume`` for a surface that is not closed.
+        V and F are not a mesh; or a face has no area, or lost it in a step where a thin part vanishes
+        (remesh between steps, or take fewer); or ``keep_volume`` is set for a surface that is not closed.
     OptionError
-        A step that is not positive, other options that do not exist.
+        ``step`` is not positive, or another option is invalid.
     """
     vertices, faces = as_mesh(V, F)
     time = _smoothing_step(step, vertices, faces)
@@ -89,14 +89,13 @@ def smooth(
 
 def _smoothing_step(step: float | None, V: FloatArray, F: IntArray) -> float:
     if step is None:
-        T = V[F]
-        return float(np.linalg.norm(T - np.roll(T, 1, axis=1), axis=2).mean() ** 2)
+        return float(lengths_in_triangles(V[F]).mean() ** 2)
     return number(step, "step", above=0.0, unit="squared units of V")
 
 
 def _staying(n: int, F: IntArray, boundary: str, fixed: ArrayLike | None) -> BoolArray:
-    """Mask of the vertices that do not move, those that no face uses among them."""
-    stays = np.bincount(F.ravel(), minlength=n) == 0
+    """Mask of the vertices that do not move, including those that no face uses."""
+    stays = ~used_vertices(F, n)
     if fixed is not None:
         stays |= as_mask(fixed, n, "fixed", "vertex")
     if boundary == "fixed":
@@ -108,14 +107,14 @@ def _staying(n: int, F: IntArray, boundary: str, fixed: ArrayLike | None) -> Boo
 def _flow(
     x: FloatArray, F: IntArray, stays: BoolArray, time: float, area: Area, i: int
 ) -> FloatArray:
-    """One implicit step."""
+    """Take one implicit step; i counts the steps before it, for messages."""
     try:
         C = cotangent_matrix(x, F)
     except MeshInputError as error:
         if i == 0:
             raise
         raise MeshInputError(f"after {i} steps: {error}") from error
-    # A vertex between faces that all but vanish has an area of 0: then it is fair already.
+    # Vertices between vanishing faces may have an area of 0; they are fair already.
     mass = np.maximum(vertex_areas(x, F, area), np.finfo(float).tiny)
     A = sp.diags_array(mass) - time * C
     solved = LaplacianSolver(A, stays).solve(mass[:, None] * x, x[stays])
@@ -124,7 +123,7 @@ def _flow(
 
 
 def _closed_parts(V: FloatArray, F: IntArray) -> list[tuple[NDArray[np.intp], float]]:
-    """Faces and volume of every component."""
+    """Return the faces and the volume of every component; refuses surfaces that are not closed."""
     n = len(V)
     start, end = halfedge_ends(F)
     if not np.array_equal(np.sort(start * n + end), np.sort(end * n + start)):
@@ -139,12 +138,13 @@ def _closed_parts(V: FloatArray, F: IntArray) -> list[tuple[NDArray[np.intp], fl
 
 
 def _volume(V: FloatArray, F: IntArray) -> float:
+    """Volume that a closed component encloses."""
     a, b, c = (V[F[:, i]] - V[F[0, 0]] for i in range(3))
     return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0)
 
 
 def _restore(x: FloatArray, F: IntArray, volume: float) -> None:
-    """Scale a component, in place, to a volume of the same sign."""
+    """Scale a component to its former volume, in place."""
     now = _volume(x, F)
     if volume == 0.0 or not now / volume > 0.0:
         raise MeshInputError("a component turned inside out or vanished; take smaller steps")

@@ -19,34 +19,34 @@ __all__ = ["LaplacianSolver"]
 
 FACTORISATIONS = ("auto", "cholesky", "cholmod", "lu")
 
-# Entries of a matrix and its transpose that differ by less, relative to the largest, are the same.
+# Entries of a matrix and its transpose count as equal below this difference, relative to the largest.
 _SYMMETRY = 1e-12
 
-# Rows that sum to less, relative to the sum of absolute values, sum to 0: constants solve them.
+# A row counts as summing to 0 below this, relative to the sum of absolute values: constants solve it.
 _ZERO_SUM = 1e-13
 
-# Residual beyond which a factor is useless, relative to |A| |x| + |b|.
+# A factor is useless beyond this residual, relative to |A| |x| + |b|.
 _RESIDUAL = 1e-6
 
 
 class LaplacianSolver:
     """Solver for ``A x = b`` at the free vertices, with ``x`` given at the fixed ones.
 
-    Symmetric matrices get a sparse Cholesky factorisation, others SuperLU's. The Laplacian of a remeshed
-    surface with uniform areas is symmetric; so are powers of Laplacians times areas, and ``M - t C``.
+    Symmetric matrices get a sparse Cholesky factorisation, others SuperLU's. The Laplacian with uniform
+    areas is symmetric; so are powers of Laplacians times areas, and ``M - t C``.
 
     Parameters
     ----------
     A : (n, n) sparse
-        `laplacian`, or any matrix with one row a vertex.
+        `laplacian`, or any matrix with one row per vertex.
     fixed : (k,) int or (n,) bool, optional
-        Vertices whose value is given.
+        Vertices with given values.
     method : {"auto", "cholesky", "cholmod", "lu"}
-        Which factorisation. "cholesky" is Eigen's simplicial one, from libigl: the fastest to factor.
-        "cholmod" is SuiteSparse's, from the package cholespy (``pip install 'remeshvec[cholmod]'``): it
-        takes twice as long to factor and 0.4 of the time to solve, so it pays from about 15 solves on.
-        "lu" is SuperLU, from SciPy. "auto" is "cholesky" where the part of A between free vertices is
-        symmetric with diagonal entries of one sign, else "lu".
+        Factorisation. "cholesky" is Eigen's simplicial one, from libigl: the fastest to factor. "cholmod"
+        is SuiteSparse's, from the package cholespy (``pip install 'remeshvec[cholmod]'``): it takes twice
+        as long to factor and 0.4 of the time to solve, so it pays from about 15 solves on. "lu" is
+        SuperLU, from SciPy. "auto" is "cholesky" where the part of A between free vertices is symmetric
+        with diagonal entries of one sign, else "lu".
 
     Attributes
     ----------
@@ -58,12 +58,12 @@ class LaplacianSolver:
     Raises
     ------
     SingularSystemError
-        A part of the mesh without a fixed vertex, where constants solve the equations; found before
-        factoring. Also where factoring fails (a matrix that is not definite).
+        A part of the mesh has no fixed vertex, and constants solve its equations; this is found before
+        factoring. Or factoring fails, because the matrix is not definite.
     MeshInputError
-        A is not square, or not finite.
+        A is not a square matrix of finite real numbers.
     OptionError
-        Indices out of range, a method that does not exist or that does not suit A.
+        An index is out of range, or the method is unknown or does not suit A.
     """
 
     def __init__(
@@ -95,14 +95,19 @@ class LaplacianSolver:
         Parameters
         ----------
         b : (n,) or (n, c) float, optional
-            Right-hand sides, of which the rows of free vertices count; 0 by default.
+            Right-hand sides; only the rows of free vertices count. 0 by default.
         x_fixed : (k,) or (k, c) float, optional
             Values at the fixed vertices, in the order of their indices; 0 by default.
 
         Returns
         -------
         (n,) or (n, c) float64
-            As many columns as the right-hand side or the fixed values have.
+            With as many columns as the right-hand sides or the fixed values.
+
+        Raises
+        ------
+        OptionError
+            A shape does not fit, or a number is not finite.
         """
         n = self.n_free + len(self.fixed)
         k = len(self.fixed)
@@ -123,7 +128,7 @@ class LaplacianSolver:
         return x
 
     def _check_factor(self) -> None:
-        """Solve once: a matrix that is nearly singular, or not definite, gives nonsense."""
+        """Solve once, to find matrices that are nearly singular or not definite: they give nonsense."""
         if not self.n_free:
             return
         b = np.random.default_rng(0).normal(size=self.n_free)
@@ -153,7 +158,7 @@ def _as_matrix(A: Any) -> sp.csc_array:
 
 
 def _check_parts(inner: sp.csc_array, across: sp.csr_array, free: NDArray[np.intp]) -> None:
-    """Find parts between whose vertices and fixed ones nothing acts, and which constants solve."""
+    """Refuse parts that are not coupled to a fixed vertex and whose equations constants solve."""
     if not len(free):
         return
     size = np.asarray(abs(inner).sum(axis=1) + abs(across).sum(axis=1))
@@ -168,7 +173,7 @@ def _check_parts(inner: sp.csc_array, across: sp.csr_array, free: NDArray[np.int
     first = free[np.unique(part, return_index=True)[1][~held]]
     what = "nothing is fixed" if not across.shape[1] else f"{(~held).sum()} parts of the mesh"
     raise SingularSystemError(
-        f"{what}: solutions are known up to a constant around {which(np.sort(first), 'vertex')}; "
+        f"{what}: solutions are known only up to a constant around {which(np.sort(first), 'vertex')}; "
         "fix at least one vertex of each part"
     )
 
@@ -191,7 +196,7 @@ def _choose(inner: sp.csc_array, method: str) -> str:
 
 
 def _factorise(inner: sp.csc_array, method: str) -> Callable[[FloatArray], FloatArray]:
-    """Factor; returns what solves."""
+    """Factor; returns a function that solves."""
     if not inner.shape[0]:
         return np.copy
     factor = {"lu": _with_lu, "cholesky": _factor_with_libigl, "cholmod": _with_cholmod}[method]
