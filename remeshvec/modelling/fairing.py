@@ -98,9 +98,7 @@ class Polyharmonic:
         used = used_vertices(F[near], len(V))
         lonely = np.flatnonzero(free & ~used)
         if len(lonely):
-            raise OptionError(
-                f"{which(lonely, 'vertex')} that should move do not belong to a face of F"
-            )
+            raise OptionError(f"{which(lonely, 'vertex')} that should move belong to no face of F")
         self.vertices = np.flatnonzero(used)
         number = np.full(len(V), -1, np.int64)
         number[self.vertices] = np.arange(len(self.vertices))
