@@ -1,4 +1,4 @@
-"""``polydata.remeshvec``: PyVista loads this module when it is first asked for, by its entry point."""
+"""``polydata.remeshvec``: PyVista loads this module on first use, through its entry point."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["RemeshvecAccessor"]
 
 @pyvista.register_dataset_accessor("remeshvec", pyvista.PolyData)
 class RemeshvecAccessor:
-    """What remeshvec does for a ``pyvista.PolyData``."""
+    """Remeshing and measures of a ``pyvista.PolyData``."""
 
     def __init__(self, mesh: Any) -> None:
         self._mesh = mesh
@@ -29,7 +29,7 @@ class RemeshvecAccessor:
         Parameters
         ----------
         L : float, str, array, callable or Adaptive, optional
-            Target edge length, or the name of point data that hold it.
+            Target edge length, or the name of point data that hold one per vertex.
         **options
             See `remeshvec.remesh`.
         """

@@ -220,7 +220,7 @@ def test_meshio_cells_that_are_no_surface():
 
 
 def test_open3d_with_texture_colours_and_materials():
-    o3d = pytest.importorskip("open3d")
+    o3d = pytest.importorskip("open3d", exc_type=ImportError)
     mesh = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(V), o3d.utility.Vector3iVector(F.astype(np.int32))
     )
@@ -319,8 +319,8 @@ def test_objects_take_all_options():
         (lambda m: remesh(m, 0.1, 0.2), OptionError, "followed by the length alone"),
         (lambda m: remesh(m, "size"), OptionError, "no data 'size' on vertices"),
         (lambda m: remesh(m, L, face_labels="part"), OptionError, "face_labels: there are no data"),
-        (lambda m: remesh(object(), L), MeshInputError, "object is no mesh that is known"),
-        (lambda m: remesh(None), MeshInputError, "NoneType is no mesh"),
+        (lambda m: remesh(object(), L), MeshInputError, "object is not a mesh of a known type"),
+        (lambda m: remesh(None), MeshInputError, "NoneType is not a mesh"),
         (lambda m: remesh("part.obj", 0.1), MeshInputError, "part.obj is a path: remesh_file"),
         (lambda m: remesh(V, F, "size"), OptionError, "L "),
     ],

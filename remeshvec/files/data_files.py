@@ -1,7 +1,7 @@
-"""Files with all that they carry: read, remeshed, written.
+"""Reading and writing meshes with their data: texture coordinates, colours, fields, groups.
 
-OBJ and PLY files are read here with what they hold besides a mesh; OFF, STL and JSON hold a mesh
-alone. All other formats are those of meshio, pyvista and trimesh.
+The package reads and writes OBJ and PLY files with data by itself; OFF, STL and JSON hold a mesh alone.
+All other formats are left to meshio, pyvista and trimesh.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ __all__ = [
     "write_data",
 ]
 
-# What patterns look for; files of other suffixes are read if they are named.
+# Suffixes that patterns look for; files with others are read if they are named.
 COMMON_SUFFIXES = (*SUFFIXES, ".vtk", ".vtu", ".vtp", ".msh", ".xdmf", ".glb", ".gltf")
 
 
 def read_data(path: FilePath) -> tuple[MeshData, list[str]]:
-    """Read a mesh with what it carries, and notices of what the reader did.
+    """Read a mesh with its data, and notices of what the reader did.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def read_data(path: FilePath) -> tuple[MeshData, list[str]]:
 
 
 def _read_own(file: ObjFile | PlyFile, path: Path) -> tuple[MeshData, list[str]]:
-    """Read a mesh with what it carries; the mesh alone, with a notice, if only that is valid."""
+    """Read a mesh with its data; the mesh alone, with a notice, if only that is valid."""
     mesh = file.mesh()
     check_polygons(mesh)
     triangles = triangulated(mesh)
@@ -94,7 +94,7 @@ def check_data_writable(path: FilePath, suffixes: Sequence[str] = ()) -> None:
 
 
 def write_data(path: FilePath, data: MeshData) -> list[str]:
-    """Write a mesh with what it carries, as far as the format can hold it.
+    """Write a mesh with its data, as far as the format can hold them.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def write_data(path: FilePath, data: MeshData) -> list[str]:
     Raises
     ------
     MeshFormatError
-        The file cannot be written; one of that name stays as it is.
+        The file cannot be written; an existing file of that name stays as it is.
     OptionError
         ``path`` is not a path.
     """

@@ -1,4 +1,4 @@
-"""Whole files: looked at before they are read, written completely or not at all."""
+"""Whole files: checked before they are read, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = [
 
 FilePath = str | os.PathLike[str]
 
-# The whole file is held in memory, and its numbers beside it.
+# A file is held in memory as a whole, together with its numbers.
 MAX_BYTES = 4 << 30
 
 
@@ -41,7 +41,7 @@ def named_errors(action: str, path: Path) -> Iterator[None]:
     """
     try:
         yield
-    except Exception as error:  # of whatever kind: libraries raise all sorts on a broken file
+    except Exception as error:  # libraries raise all sorts on a broken file
         raise MeshFormatError(f"cannot {action} {path}: {reason(error)}") from error
 
 
@@ -59,7 +59,7 @@ def reason(error: Exception) -> str:
 
 
 def check_regular(path: Path) -> None:
-    """Refuse a path where no regular file is.
+    """Refuse a path that does not lead to a regular file.
 
     Raises
     ------
@@ -76,13 +76,13 @@ def check_regular(path: Path) -> None:
 
 
 def checked_bytes(path: Path) -> bytes:
-    """Return the content of a file that is there, regular, of bearable size, and what it claims.
+    """Return the content of a regular file of bearable size whose format fits its suffix.
 
     Raises
     ------
     ValueError
-        The file is missing, empty, not a regular file, too large, compressed, or of another format
-        than its suffix says.
+        The file is missing, empty, not regular, too large, compressed, or of another format than its
+        suffix says.
     """
     check_regular(path)
     size = path.stat().st_size
@@ -96,7 +96,7 @@ def checked_bytes(path: Path) -> bytes:
 
 
 def _check_suffix(data: bytes, suffix: str) -> None:
-    """Refuse content that plainly is something else than the suffix says."""
+    """Refuse content that is plainly of another format than the suffix says."""
     if data[:2] == b"\x1f\x8b" or data[:4] == b"PK\x03\x04":
         raise ValueError("it is compressed; unpack it first")
     found = _format_of(data)
@@ -153,7 +153,7 @@ def check_writable(path: FilePath, suffixes: Sequence[str] = ()) -> None:
     Raises
     ------
     MeshFormatError
-        The suffix is not allowed, the folder is not there or cannot be written to, or a folder has
+        The suffix is not allowed, the folder does not exist or cannot be written to, or a folder has
         this name.
     """
     with named_errors("write", Path(arguments.path(path, "path"))):

@@ -1,4 +1,4 @@
-"""Files that other libraries read and write for us: meshio, pyvista and trimesh, each if installed."""
+"""Files that other libraries read and write: meshio, pyvista and trimesh, each if it is installed."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from ..processes.pool import run_in_processes
 __all__ = ["can_write", "read_foreign", "write_foreign"]
 
 _OWN = ".obj, .off, .ply, .stl, .json"
-# What meshio would read too, but knows as a drawing, a table, or not on its own.
+# meshio reads these too, but as a drawing, as a table, or only together with a second file.
 _NOT_MESHIO = (".svg", ".xml", ".dat", ".post", ".post.gz", ".ele", ".node")
 _PYVISTA = (".vtp",)
 _TRIMESH = (".glb", ".gltf", ".3mf", ".dae")
-_READ_ONLY = (".3mf", ".dae")  # written without what they carry
+_READ_ONLY = (".3mf", ".dae")  # trimesh writes them without the data
 
-# Formats of meshio that hold any data on points and cells.
+# Formats of meshio that hold any data on points and cells; numbers of components that they can hold.
 _WITH_DATA = ("vtk", "vtu", "xdmf", "gmsh22")
 _COLUMNS: dict[str | None, tuple[int, ...]] = {"xdmf": (1, 3, 6, 9), "gmsh22": (1, 3, 9)}
 
@@ -59,7 +59,7 @@ def _library(suffix: str) -> tuple[str, Any]:
 
 
 def can_write(suffix: str) -> str | None:
-    """Return why a file of this suffix cannot be written, None if it can."""
+    """Return why a file with this suffix cannot be written, None if it can."""
     try:
         name, library = _library(suffix)
     except ValueError as error:
@@ -70,20 +70,20 @@ def can_write(suffix: str) -> str | None:
 
 
 def _writer(meshio: Any, suffix: str) -> str | None:
-    """Return that of meshio's formats for a suffix that holds most and can be written."""
+    """Return the format of meshio that can be written under a suffix and holds the most data."""
     if suffix == ".msh":
-        return "gmsh22"  # the format 4.1 wants entities for all tags
+        return "gmsh22"  # format 4.1 needs an entity for every tag
     kinds = meshio.extension_to_filetypes[suffix]
     known = [kind for kind in kinds if kind in meshio._helpers._writer_map]
     return min(known, key=lambda kind: (kind not in _WITH_DATA, kinds.index(kind)), default=None)
 
 
 def read_foreign(path: Path) -> tuple[MeshData, list[str]]:
-    """Read a file with the library that knows it; returns notices of what was left out, too."""
+    """Read a file with the library that knows it; returns also notices of data left out."""
     name, _ = _library(path.suffix.lower())
     if name != "pyvista":
         return _read_here(name, path)
-    # VTK ends the process where a damaged file asks for more memory than there is.
+    # VTK ends the process if a damaged file asks for more memory than there is.
     (outcome,) = run_in_processes(_read_polydata, [path], None, 1)
     if outcome.error is not None:
         raise outcome.error
@@ -93,7 +93,7 @@ def read_foreign(path: Path) -> tuple[MeshData, list[str]]:
 def _read_here(name: str, path: Path) -> tuple[MeshData, list[str]]:
     library = importlib.import_module(name)
     with warnings.catch_warnings():
-        warnings.simplefilter("error", UserWarning)  # that is how pyvista tells errors of VTK
+        warnings.simplefilter("error", UserWarning)  # pyvista reports errors of VTK as warnings
         if name == "trimesh":
             found = library.load(str(path), force="scene", process=False)
         else:
@@ -107,23 +107,23 @@ def _read_here(name: str, path: Path) -> tuple[MeshData, list[str]]:
 
 
 def _read_polydata(path: Path, _: None) -> tuple[MeshData, list[str]]:
-    """Read with pyvista, in a process of its own."""
+    """Read with pyvista; runs in a worker process."""
     return _read_here("pyvista", path)
 
 
 def _read_meshio(meshio: Any, path: Path) -> Any:
-    """Try the formats of a suffix; ``meshio.read`` would end the process where none fits."""
+    """Try the formats of a suffix; ``meshio.read`` would end the process if none fits."""
     problem: Exception = ValueError("it is empty")
     for kind in meshio.extension_to_filetypes[path.suffix.lower()]:
         try:
             return meshio._helpers.reader_map[kind](str(path))
-        except Exception as error:  # of whatever kind
+        except Exception as error:  # readers raise all sorts on a broken file
             problem = error
     raise problem
 
 
 def _read_scene(scene: Any) -> MeshData:
-    """Read all meshes of a scene where they stand, each a group of faces."""
+    """Join all meshes of a scene in place; each becomes a group of faces."""
     parts = [mesh for mesh in scene.dump(concatenate=False) if hasattr(mesh, "faces")]
     if not parts:
         raise ValueError("it holds no triangle mesh")
@@ -143,18 +143,18 @@ def _read_scene(scene: Any) -> MeshData:
             values = _joined([table.get(name) for table in tables], counts)
             if values is not None:
                 getattr(out, side)[name] = values
-    kept = [
+    feature_data = [
         name
         for part in read
         for name in part.feature_data
         if name in out.on_vertices | out.on_faces
     ]
-    out.feature_data = (*dict.fromkeys(kept), *([_SCENE] if len(parts) > 1 else []))
+    out.feature_data = (*dict.fromkeys(feature_data), *([_SCENE] if len(parts) > 1 else []))
     return out
 
 
 def _joined(arrays: list[Any], counts: list[int]) -> Any:
-    """Concatenate arrays, zeros for those that are missing; None where shapes differ."""
+    """Concatenate arrays, with zeros for missing ones; None if their shapes differ."""
     known = [x for x in arrays if x is not None]
     if len({x.shape[1:] for x in known}) > 1:
         return None
@@ -163,7 +163,7 @@ def _joined(arrays: list[Any], counts: list[int]) -> Any:
 
 
 def write_foreign(path: Path, data: MeshData) -> tuple[bytes, set[str]]:
-    """Return the bytes of a file as the library that knows its suffix writes it, and what it holds."""
+    """Return a file as the library that knows its suffix writes it, and the names of data in it."""
     suffix = path.suffix.lower()
     name, library = _library(suffix)
     held = {*data.on_vertices, *data.on_faces, *data.on_corners}
@@ -172,7 +172,7 @@ def write_foreign(path: Path, data: MeshData) -> tuple[bytes, set[str]]:
         file = str(Path(folder) / f"mesh{suffix}")
         if name == "trimesh":
             held -= set(data.on_faces) - {_SCENE, COLOUR, "color"}
-            return bytes(_scene(library, data).export(file_type=suffix[1:])), held
+            return bytes(_as_scene(library, data).export(file_type=suffix[1:])), held
         if name == "pyvista":
             _polydata(library, data).save(file)
         else:
@@ -185,7 +185,7 @@ def write_foreign(path: Path, data: MeshData) -> tuple[bytes, set[str]]:
 
 
 def _fit(data: MeshData, kind: str | None) -> set[str]:
-    """Bring data into a shape that a format of meshio knows; returns the names of what cannot be."""
+    """Reshape data for a format of meshio, and drop other data; returns the names of those dropped."""
     lost = set()
     for table in (data.on_vertices, data.on_faces):
         for name, values in list(table.items()):
@@ -194,7 +194,7 @@ def _fit(data: MeshData, kind: str | None) -> set[str]:
                 flat = np.column_stack([flat, np.zeros(len(flat), flat.dtype)])
             columns = 1 if flat.ndim == 1 else flat.shape[1]
             small = flat.dtype.kind in "iub" and flat.dtype.itemsize < 4
-            table[name] = flat.astype(np.int32) if small else flat  # XDMF knows none of less
+            table[name] = flat.astype(np.int32) if small else flat  # XDMF has no shorter ones
             if flat.dtype.kind not in "fiub" or columns not in _COLUMNS.get(kind, (columns,)):
                 lost.add(name)
                 del table[name]
@@ -202,12 +202,12 @@ def _fit(data: MeshData, kind: str | None) -> set[str]:
 
 
 def _write_meshio(meshio: Any, mesh: Any, file: str, kind: str | None) -> None:
-    options = {"data_format": "XML"} if kind == "xdmf" else {}  # one file, without HDF5 beside it
+    options = {"data_format": "XML"} if kind == "xdmf" else {}  # one file, no HDF5 file beside it
     meshio.write(file, mesh, file_format=kind, **options)
 
 
 def _vertex_values(data: MeshData) -> MeshData:
-    """Move data on corners to vertices, doubled where they differ."""
+    """Move data on corners to vertices; vertices whose corners differ are doubled."""
     if not data.on_corners:
         return data
     corner, F = split_vertices(data.F, list(data.on_corners.values()))
@@ -223,7 +223,7 @@ _PLAIN = {UV: "uv", COLOUR: "color"}
 
 
 def _plain_names(data: MeshData) -> MeshData:
-    """Drop marks from names that readers of other objects put there, and what only these know."""
+    """Replace names that stand for a scene or its visuals by those that files use."""
     vertices = {_PLAIN.get(name, name): x for name, x in data.on_vertices.items()}
     faces = {_PLAIN.get(name, name): x for name, x in data.on_faces.items() if name != _SCENE}
     return MeshData(data.V, data.F, vertices, faces, extra=data.extra)
@@ -241,8 +241,8 @@ def _polydata(pyvista: Any, data: MeshData) -> Any:
     return mesh
 
 
-def _scene(trimesh: Any, data: MeshData) -> Any:
-    """Make a scene of one mesh for each part, with the looks of the parts that were read."""
+def _as_scene(trimesh: Any, data: MeshData) -> Any:
+    """Make a scene with one mesh per part, each with the visuals of the part that was read."""
     parts = data.extra.get("scene", [None])
     member = data.on_faces.get(_SCENE, np.zeros(len(data.F), np.int64))
     meshes = []

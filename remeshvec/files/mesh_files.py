@@ -1,7 +1,7 @@
 """Reading and writing meshes: OBJ, OFF, PLY, STL and JSON.
 
-Each format has one parser, which refuses what it does not understand, and one writer. Whatever goes
-wrong is a `MeshFormatError` that names the file and the reason.
+Each format has one writer and one parser, which refuses anything it does not understand. All failures
+are a `MeshFormatError` that names the file and the reason.
 """
 
 from __future__ import annotations

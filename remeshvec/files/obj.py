@@ -1,7 +1,7 @@
-"""OBJ files: vertices and faces; texture coordinates, colours, groups and materials for who asks.
+"""OBJ files: vertices and faces; on request texture coordinates, colours, groups and materials.
 
-One parser serves both: statements are sorted by keyword, each with its position in the file, which
-decides what a negative index counts from and which group a face is in.
+One parser serves both. It sorts statements by keyword and remembers their positions in the file, which
+decide what a negative index counts from and which group a face is in.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from .text import floats, integers, number_table, points, shown, text_lines, wor
 __all__ = ["OBJ_DATA", "ObjFile", "obj_bytes"]
 
 
-# Statements that name parts of a mesh, with the names that their data go by.
+# Statements that name parts of a mesh, and the names of these data here.
 _PARTS = {"o": "object", "g": "group", "usemtl": "material"}
 OBJ_DATA = frozenset({"uv", "color", *_PARTS.values()})
 
 _CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
 _CORNER = re.compile(rb"(-?\d{1,9})(?:/(-?\d*)(?:/-?\d*)?)?")
-_ABSENT = (None, b"", b"-")  # what stands for no texture coordinate
+_ABSENT = (None, b"", b"-")  # a corner without texture coordinate
 
 
 class _FaceIndices(NamedTuple):
@@ -72,7 +72,7 @@ class ObjFile:
         return [self._lines[i][len(keyword) :] for i in self._at(keyword).tolist()]
 
     def _zero_based(self, indices: IntArray, keyword: str) -> IntArray:
-        """Turn indices of corners, which count from 1 or back from the face, to ones from 0."""
+        """Turn indices of corners, which count from 1 or back from the face, into 0-based ones."""
         if (indices > 0).all():
             return indices - 1
         known = np.searchsorted(self._at(keyword), self._at("f"))  # statements before each face
@@ -85,15 +85,15 @@ class ObjFile:
         return PolygonMesh(self._vertices[:, :3].copy(), corners, self._faces.sizes, [])
 
     def data(self, V: FloatArray, triangles: Triangles, folder: Path) -> MeshData:
-        """Return the mesh with what else the file holds.
+        """Return the mesh with everything else the file holds.
 
         Parameters
         ----------
         V : (n, 3)
         triangles : Triangles
-            What the polygons were cut into.
+            The polygons, cut.
         folder : Path
-            What the names of material libraries are relative to.
+            Names of material libraries are relative to it.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class ObjFile:
         if self._vertices.shape[1] >= 6:
             data.on_vertices["color"] = self._vertices[:, 3:6].copy()
         if len(self._at("mtllib")):
-            names = [_name(operand) for operand in self._operands("mtllib")]
+            names = [_decoded(operand) for operand in self._operands("mtllib")]
             data.extra["mtllib"] = [str((folder / name).resolve()) for name in names]
         return data
 
@@ -133,14 +133,14 @@ class ObjFile:
 
     def _parts(self, keyword: str) -> tuple[list[str], IntArray]:
         """Return the names of parts by first appearance, and the part of each face, -1 for none."""
-        names = [_name(operand) for operand in self._operands(keyword)]
+        names = [_decoded(operand) for operand in self._operands(keyword)]
         number = {name: i for i, name in enumerate(dict.fromkeys(names))}
         label = np.array([*(number[name] for name in names), -1])
         latest = np.searchsorted(self._at(keyword), self._at("f")) - 1  # -1, the last, for none
         return list(number), label[latest]
 
 
-def _name(operand: bytes) -> str:
+def _decoded(operand: bytes) -> str:
     return operand.decode("utf-8", "replace").strip()
 
 
@@ -204,21 +204,21 @@ def obj_bytes(data: MeshData, path: Path) -> bytes:
         colours = colours / np.iinfo(colours.dtype).max
     points = data.V if colours is None else np.column_stack([data.V, colours[:, :3]])
     lines = [f"mtllib {_relative(name, path)}" for name in data.extra.get("mtllib", [])]
-    lines += _rows("v", np.asarray(points, float))
+    lines += _statements("v", np.asarray(points, float))
     F = data.F + 1
     if "uv" in data.on_corners:
         uv = np.asarray(data.on_corners["uv"], float).reshape(-1, 2)
         known, at = np.unique(uv, axis=0, return_inverse=True)
-        lines += _rows("vt", known)
+        lines += _statements("vt", known)
         pairs = np.stack([F, at.reshape(F.shape) + 1], axis=2).tolist()
         faces = ["f " + " ".join(f"{v}/{t}" for v, t in face) for face in pairs]
     else:
-        faces = _rows("f", F)
+        faces = _statements("f", F)
     _add_parts(faces, data)
     return "\n".join([*lines, *faces, ""]).encode()
 
 
-def _rows(keyword: str, table: NDArray[Any]) -> list[str]:
+def _statements(keyword: str, table: NDArray[Any]) -> list[str]:
     """Return a statement per row."""
     pattern = " ".join([keyword, *["{!r}"] * table.shape[1]])
     return [pattern.format(*row) for row in table.tolist()]

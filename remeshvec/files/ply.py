@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from ..interop.mesh_data import Data, MeshData
 from ..mesh.polygons import fan_triangles
 from .ply_header import TYPE_NAMES, parse_header
-from .ply_tables import Table, read_tables
+from .ply_tables import PlyTable, read_tables
 from .polygon_mesh import PolygonMesh, Triangles
 from .text import floats, shown
 
 __all__ = ["PlyFile", "ply_bytes"]
 
-# Properties that belong together, in the order of their names: what they go by here.
-_COLOURS = [("red", "green", "blue", "alpha"), ("red", "green", "blue")]
+# Names of vectors here, and of their components in PLY files.
 _VECTORS: dict[str, list[tuple[str, ...]]] = {
-    "color": _COLOURS,
+    "color": [("red", "green", "blue", "alpha"), ("red", "green", "blue")],
     "normal": [("nx", "ny", "nz")],
     "uv": [("s", "t"), ("u", "v"), ("texture_u", "texture_v")],
 }
@@ -53,11 +52,11 @@ class PlyFile:
 
     def mesh(self) -> PolygonMesh:
         """Return the vertices and polygons."""
-        axes = [_numbers(self._vertices.scalars[axis], axis) for axis in "xyz"]
+        axes = [_as_numbers(self._vertices.scalars[axis], axis) for axis in "xyz"]
         indices, sizes = self._faces.lists[self._indices]
         return PolygonMesh(
             np.stack(axes, axis=1).astype(np.float64, copy=False),
-            _cast(_numbers(indices, self._indices), np.int64, self._indices),
+            _cast(_as_numbers(indices, self._indices), np.int64, self._indices),
             sizes,
             [],
         )
@@ -68,12 +67,12 @@ class PlyFile:
         Raises
         ------
         ValueError
-            A value is not of the type that the header tells.
+            A value does not have the type that the header states.
         """
         data = MeshData(V, triangles.F)
         vertex = self._columns("vertex", self._vertices)
-        _group(vertex, data.on_vertices, data.extra)
-        _group(self._columns("face", self._faces), data.on_faces, {})
+        _join_vectors(vertex, data.on_vertices, data.extra)
+        _join_vectors(self._columns("face", self._faces), data.on_faces, {})
         data.on_faces = {name: x[triangles.polygon] for name, x in data.on_faces.items()}
         uv = self._texture_coordinates()
         if uv is not None:
@@ -85,10 +84,10 @@ class PlyFile:
             data.extra["comments"] = self._header.comments
         return data
 
-    def _columns(self, element: str, table: Table) -> Data:
+    def _columns(self, element: str, table: PlyTable) -> Data:
         """Return the columns of a table besides coordinates, in the types of the header."""
         return {
-            p.name: _cast(_numbers(table.scalars[p.name], p.name), p.dtype, p.name)
+            p.name: _cast(_as_numbers(table.scalars[p.name], p.name), p.dtype, p.name)
             for p in self._header.element(element).properties
             if p.name in table.scalars and p.name not in ("x", "y", "z")
         }
@@ -99,12 +98,12 @@ class PlyFile:
         sizes = self._faces.lists[self._indices][1]
         if not np.array_equal(counts, 2 * sizes):
             return None
-        uv = _numbers(values, "texcoord").astype(np.float64).reshape(-1, 2)
+        uv = _as_numbers(values, "texcoord").astype(np.float64).reshape(-1, 2)
         return uv[fan_triangles(np.arange(len(uv)), sizes)[0]]
 
 
-def _numbers(values: Any, name: str) -> NDArray[Any]:
-    """Return a column as numbers: NaN and infinite ones count as such here."""
+def _as_numbers(values: Any, name: str) -> NDArray[Any]:
+    """Return a column as numbers, NaN and infinity among them."""
     if not isinstance(values, list):
         return np.asarray(values)
     numbers = floats(b" ".join(values))
@@ -119,7 +118,7 @@ def _number(word: bytes, name: str) -> float:
 
 
 def _cast(values: NDArray[Any], dtype: Any, name: str) -> NDArray[Any]:
-    """Return values in the type that the header tells, in which they must fit."""
+    """Return values in the type that the header states; integers must fit it."""
     kind = np.dtype(dtype)
     with np.errstate(invalid="ignore", over="ignore"):
         cast = values.astype(kind)
@@ -128,8 +127,8 @@ def _cast(values: NDArray[Any], dtype: Any, name: str) -> NDArray[Any]:
     return cast
 
 
-def _group(columns: Data, into: Data, extra: dict[str, Any]) -> None:
-    """Put columns that belong together into one array, and note which they were."""
+def _join_vectors(columns: Data, into: Data, extra: dict[str, Any]) -> None:
+    """Join the components of vectors into one array each, and note their names."""
     rest = dict(columns)
     for name, choices in _VECTORS.items():
         for choice in choices:
@@ -178,7 +177,7 @@ def _written(name: str, scalars: Data, lists: Data, count: int) -> tuple[list[st
 
 
 def _scalars(data: Data, extra: dict[str, Any]) -> Data:
-    """Return columns of one number each."""
+    """Return data as columns of scalars."""
     columns: Data = {}
     for name, values in data.items():
         values = _storable(values, name)
@@ -199,7 +198,7 @@ def _property_names(name: str, count: int) -> tuple[str, ...]:
 
 
 def _storable(values: NDArray[Any], name: str) -> NDArray[Any]:
-    """Return values in a type that PLY knows: no integers beyond 32 bits, and no truth values."""
+    """Return values in a type that PLY knows: no booleans, no integers beyond 32 bits."""
     if values.dtype.kind == "b":
         return values.astype(np.uint8)
     if values.dtype.kind in "iu" and values.dtype.itemsize == 8:

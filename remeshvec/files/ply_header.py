@@ -1,4 +1,4 @@
-"""The header of PLY files: which tables follow, with which columns, in which format."""
+"""The header of PLY files: their format, tables and columns."""
 
 from __future__ import annotations
 

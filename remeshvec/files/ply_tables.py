@@ -1,7 +1,7 @@
 """The tables of PLY files, as text and binary.
 
-Rows that all have lists of the same lengths, as those of the first row, are read as one array. Other
-tables are walked row by row.
+A table is read as one array if the lists in every row are as long as those in the first row.
+Otherwise it is walked row by row.
 """
 
 from __future__ import annotations
@@ -17,31 +17,30 @@ from ..core.vocabulary import IntArray
 from .ply_header import BYTE_ORDER, Element, PlyHeader, Property
 from .text import check_room, number_table, shown, text_lines
 
-__all__ = ["Table", "read_tables"]
+__all__ = ["PlyTable", "read_tables"]
 
+_LONGEST_LIST = 1 << 20  # in the first row; a longer one is rather a misread length
 
-_MOST_IN_A_ROW = 1 << 20  # a longer list in the first row is rather a misread length
-
-
-# Values of each column, one row after the other, with their number per row; and where the table ends.
+# For each column its values, one row after the other, with their number per row; where the table ends.
 _Columns = tuple[list[tuple[Any, IntArray]], int]
 
 
-class Table(NamedTuple):
-    """Columns by name, all values as numbers of the types that the header tells.
+class PlyTable(NamedTuple):
+    """Columns by name. Values are arrays, or lists of words where not all words of a text are numbers.
 
     Parameters
     ----------
-    scalars : dict of (rows,) arrays, or of lists of words
+    scalars : dict
+        One value per row.
     lists : dict of pairs
-        The values of all rows, one row after the other, and how many of them each row has.
+        The values of all rows, one row after the other, and their number per row.
     """
 
     scalars: dict[str, Any]
     lists: dict[str, tuple[Any, IntArray]]
 
 
-def read_tables(data: bytes, header: PlyHeader) -> dict[str, Table]:
+def read_tables(data: bytes, header: PlyHeader) -> dict[str, PlyTable]:
     """Read the tables of vertices and faces; others are skipped.
 
     Raises
@@ -53,7 +52,7 @@ def read_tables(data: bytes, header: PlyHeader) -> dict[str, Table]:
     return read(data, header)
 
 
-def _text_tables(data: bytes, header: PlyHeader) -> dict[str, Table]:
+def _text_tables(data: bytes, header: PlyHeader) -> dict[str, PlyTable]:
     lines = text_lines(data[header.start :])
     check_room(sum(element.rows for element in header.elements), len(lines), "lines")
     tables, start = {}, 0
@@ -64,15 +63,15 @@ def _text_tables(data: bytes, header: PlyHeader) -> dict[str, Table]:
     return tables
 
 
-def _text_table(lines: Sequence[bytes], element: Element) -> Table:
+def _text_table(lines: Sequence[bytes], element: Element) -> PlyTable:
     rows = number_table(lines)
     table = None if rows is None else _even_text(rows, element)
     return _walk_lines(lines, element) if table is None else table
 
 
-def _even_text(rows: NDArray[Any], element: Element) -> Table | None:
-    """Take rows of numbers apart; None unless all have lists of the same lengths."""
-    table, at = Table({}, {}), 0
+def _even_text(rows: NDArray[Any], element: Element) -> PlyTable | None:
+    """Split rows of numbers into columns; None unless all rows have lists of the same lengths."""
+    table, at = PlyTable({}, {}), 0
     for column in element.properties:
         if at >= rows.shape[1]:
             return None
@@ -80,16 +79,16 @@ def _even_text(rows: NDArray[Any], element: Element) -> Table | None:
         if column.length is None:
             table.scalars.setdefault(column.name, values)
             continue
-        k = int(values[0])
-        if k < 0 or at + k > rows.shape[1] or (values != k).any():
+        if not 0 <= values[0] <= rows.shape[1] - at or (values != int(values[0])).any():
             return None
+        k = int(values[0])
         table.lists.setdefault(column.name, (rows[:, at : at + k].ravel(), np.full(len(rows), k)))
         at += k
     return table
 
 
-def _walk_lines(lines: Sequence[bytes], element: Element) -> Table:
-    """Take rows apart word by word."""
+def _walk_lines(lines: Sequence[bytes], element: Element) -> PlyTable:
+    """Split rows into columns word by word."""
     columns: list[tuple[list[bytes], list[int]]] = [([], []) for _ in element.properties]
     for line in lines:
         words, at = line.split(), 0
@@ -109,8 +108,8 @@ def _list_length(words: list[bytes], at: int) -> int:
     return int(words[at]) if at < len(words) and words[at].isdigit() else -1
 
 
-def _by_name(element: Element, columns: Sequence[tuple[Any, IntArray]]) -> Table:
-    table = Table({}, {})
+def _by_name(element: Element, columns: Sequence[tuple[Any, IntArray]]) -> PlyTable:
+    table = PlyTable({}, {})
     for column, (values, sizes) in zip(element.properties, columns, strict=True):
         if column.length is None:
             table.scalars.setdefault(column.name, values)
@@ -119,7 +118,7 @@ def _by_name(element: Element, columns: Sequence[tuple[Any, IntArray]]) -> Table
     return table
 
 
-def _binary_tables(data: bytes, header: PlyHeader) -> dict[str, Table]:
+def _binary_tables(data: bytes, header: PlyHeader) -> dict[str, PlyTable]:
     least = sum(element.rows * element.least_bytes for element in header.elements)
     check_room(least, len(data) - header.start, "bytes")
     order, position, tables = BYTE_ORDER[header.format], header.start, {}
@@ -142,7 +141,7 @@ def _first_row(data: bytes, element: Element, order: str, position: int) -> np.d
             if at + length.itemsize > len(data):
                 return None
             k = int(np.frombuffer(data, length, 1, at)[0]) if element.rows else 0
-            if not 0 <= k <= _MOST_IN_A_ROW:
+            if not 0 <= k <= _LONGEST_LIST:
                 return None
             fields += [(f"length {i}", length), (f"values {i}", order + column.dtype, (k,))]
         else:
@@ -199,7 +198,7 @@ def _length_of(column: Property, order: str) -> struct.Struct | None:
 def _gathered(
     data: bytes, kind: np.dtype[Any], starts: list[int], sizes: list[int]
 ) -> tuple[NDArray[Any], IntArray]:
-    """Return values that lie in runs here and there."""
+    """Return the values of lists, or of single scalars, that start at these bytes."""
     size = np.array(sizes, np.int64)
     within = np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
     at = np.repeat(np.array(starts, np.int64), size) + kind.itemsize * within

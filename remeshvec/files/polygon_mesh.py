@@ -1,4 +1,4 @@
-"""What every reader returns: vertices and polygons, and what must hold for them."""
+"""Vertices and polygons, as every parser returns them, with their checks."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Triangles(NamedTuple):
 
 
 def check_polygons(mesh: PolygonMesh) -> None:
-    """Refuse what is not a mesh, whoever made it.
+    """Refuse arrays that are not a mesh.
 
     Raises
     ------

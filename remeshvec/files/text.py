@@ -1,8 +1,8 @@
 """Text formats: lines, and the numbers in them, parsed in blocks.
 
-A block of lines is parsed at once and accepted only if every word in it is a number. Where one is
-not, the caller looks at the lines one by one, and either finds the line to refuse or knows which words
-count: an OBJ file may say anything after the coordinates of a vertex.
+A block of lines is parsed at once if every word in it is a number. Otherwise its lines are parsed one by
+one: this finds the line to refuse, or ignores words that may be anything, such as those after the
+coordinates of a vertex in an OBJ file.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _INDEX = re.compile(rb"\d{1,9}")
 
 
 def text_lines(data: bytes) -> list[bytes]:
-    """Return the lines that say something, without comments, of a text in any 8-bit encoding."""
+    """Return the lines of a text in any 8-bit encoding, without comments and blank lines."""
     if b"\0" in data:
         raise ValueError("it holds binary data or UTF-16 where text is expected")
     data = data.removeprefix(b"\xef\xbb\xbf")
@@ -55,7 +55,7 @@ def check_room(needed: int, available: int, unit: str) -> None:
 
 
 def shown(line: bytes) -> str:
-    """Return a line as it can stand in a message: short, and in characters that print."""
+    """Return a line for a message: shortened, in printable characters."""
     text = line[:60].decode("ascii", "replace").replace("�", "?")
     return repr(text + ("..." if len(line) > 60 else ""))
 
@@ -71,7 +71,7 @@ def floats(text: bytes) -> FloatArray | None:
 
 
 def integers(text: bytes) -> IntArray | None:
-    """Return the integers of a text, those beyond 64 bits as the nearest; None if a word is not one."""
+    """Return the integers of a text, clipped to 64 bits; None if a word is not an integer."""
     if text.translate(None, _INTEGER_CHARACTERS) or not _signs_are_in_place(text):
         return None
     if not text.strip():

@@ -1,4 +1,4 @@
-"""A mesh with the data it carries, on its way from an object or a file through `remesh` and back."""
+"""A mesh with its data, on the way from an object or a file through `remesh` and back."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.vocabulary import EQUAL_DATA
+from ..mesh.edges import components, edge_keys, halfedge_ends
 
 __all__ = ["Data", "MeshData", "carry", "corner_values", "split_vertices"]
 
@@ -18,7 +19,7 @@ Data = dict[str, NDArray[Any]]
 
 @dataclass
 class MeshData:
-    """Arrays of a mesh and of what it carries.
+    """Arrays of a mesh and of its data.
 
     Attributes
     ----------
@@ -27,13 +28,13 @@ class MeshData:
     on_vertices, on_faces, on_corners : dict of arrays
         By name: (n, ...), (m, ...), (m, 3, ...).
     feature_data : tuple of str
-        Names of data whose jumps, or borders, are to be kept: texture coordinates, groups.
+        Names of data whose jumps or borders are features: texture coordinates, groups.
     directions : tuple of str
         Names of data on vertices that are unit vectors.
     wrap : callable, optional
-        Makes an object of the kind that this was read from.
+        Makes an object of the type that this was read from.
     extra : dict
-        What readers and writers of files tell each other besides: textures, materials.
+        Further information that readers of files leave for writers: textures, materials.
     """
 
     V: NDArray[Any]
@@ -47,7 +48,7 @@ class MeshData:
     extra: dict[str, Any] = field(default_factory=dict)
 
     def preserved(self, requested: Any = None) -> list[Any] | None:
-        """Return the data to be kept, and what is asked for besides, as ``remesh`` takes them."""
+        """Return the argument ``preserve`` of ``remesh``: the feature data, then those requested."""
         several = (
             requested
             if isinstance(requested, list | tuple)
@@ -58,7 +59,7 @@ class MeshData:
         return [*map(self.find, self.feature_data), *several] or None
 
     def find(self, name: str) -> NDArray[Any]:
-        """Return data on faces or corners by name; those on vertices as their corners have them."""
+        """Return data on faces or corners by name, data on vertices spread to corners."""
         for data in (self.on_faces, self.on_corners):
             if name in data:
                 return data[name]
@@ -71,10 +72,10 @@ def corner_values(values: NDArray[Any], F: NDArray[Any]) -> NDArray[Any]:
 
 
 def carry(data: MeshData, result: Any) -> MeshData:
-    """Bring all data of a mesh over to the result of ``remesh``.
+    """Transfer all data of a mesh to the result of ``remesh``.
 
-    Where vertices lay in one place with different data, as at the seams of a texture, the new vertices
-    on the same curves are doubled.
+    Where several vertices lay in one place with different data, as at texture seams, the new vertices on
+    the same curves are doubled.
     """
     F = np.asarray(result.F)
     out = replace(
@@ -109,7 +110,7 @@ def carry(data: MeshData, result: Any) -> MeshData:
 def split_vertices(
     F: NDArray[Any], at_corners: list[NDArray[Any]]
 ) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Give corners of one vertex a vertex each where their data differ.
+    """Split vertices whose corners have different data.
 
     Parameters
     ----------
@@ -119,20 +120,17 @@ def split_vertices(
     Returns
     -------
     corner : (k,) int64
-        For every new vertex one of its corners ``3 * face + c``.
+        For every new vertex one of its corners ``3 f + c``.
     F : (m, 3)
         Faces of the new vertices, in the dtype of the old.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     h = np.arange(F.size)
     after = h + 1 - 3 * (h % 3 == 2)
-    ends = np.stack([F.ravel(), F.ravel()[after]])
-    # Half-edges of the same edge follow each other; corners at both of its ends are compared.
-    order = np.lexsort((*np.sort(ends, axis=0),))
+    # Half-edges of one edge come one after the other; the corners at both its ends are compared.
+    key = edge_keys(halfedge_ends(F), int(F.max()) + 1)
+    order = np.argsort(key, kind="stable")
     one, two = order[:-1], order[1:]
-    same_edge = (np.sort(ends[:, one], axis=0) == np.sort(ends[:, two], axis=0)).all(axis=0)
+    same_edge = key[one] == key[two]
     one, two = one[same_edge], two[same_edge]
     turned = F.ravel()[one] != F.ravel()[two]
     pairs = np.concatenate(
@@ -145,9 +143,7 @@ def split_vertices(
     joined = np.ones(pairs.shape[1], np.bool_)
     for values in at_corners:
         joined &= _data_agree(values.reshape(F.size, -1), *pairs)
-    a, b = pairs[:, joined]
-    graph = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(F.size, F.size))
-    _, label = connected_components(graph, directed=False)
+    _, label = components(F.size, *pairs[:, joined])
     # New vertices in the order of the old ones.
     _, corner = np.unique(label, return_index=True)
     corner = corner[np.lexsort((corner, F.ravel()[corner]))]
@@ -168,7 +164,7 @@ def _data_agree(values: NDArray[Any], one: NDArray[Any], two: NDArray[Any]) -> N
 
 
 def _method(values: NDArray[Any]) -> str:
-    """Colours in bytes are mixed; other whole numbers are labels."""
+    """Choose how to transfer data: colours in bytes are mixed, other integers are labels."""
     is_colour = values.dtype.kind == "u" and values.ndim == 2 and values.shape[1] in (3, 4)
     return "linear" if is_colour else "auto"
 

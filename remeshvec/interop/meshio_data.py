@@ -1,4 +1,4 @@
-"""Meshes of meshio: blocks of cells, with data by block."""
+"""Meshes of meshio: blocks of cells, with data per block."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from .mesh_data import Data, MeshData
 
 __all__ = ["is_meshio", "read_meshio", "write_meshio"]
 
-# Cells that surfaces consist of, and those that lie on surfaces and are left out.
+# Cells that surfaces consist of, and those that may lie on them and are left out.
 _FACE_CELLS = ("triangle", "quad", "polygon")
 _LOWER = ("vertex", "line")
 
-# Names of cell data by which programs name parts of a mesh.
+# Cell data in which programs number the parts of a mesh.
 GROUPS = ("gmsh:physical", "gmsh:geometrical", "medit:ref", "cell_tags", "group", "material")
 
 _BLOCK, _SET = "meshio:block", "meshio:set:"
 
 
 def is_meshio(value: Any) -> bool:
-    """Tell a ``meshio.Mesh`` by what it has."""
+    """Recognise a ``meshio.Mesh`` by its attributes."""
     return all(hasattr(value, name) for name in ("points", "cells", "point_data", "cell_data"))
 
 
 def read_meshio(mesh: Any) -> MeshData:
     """Read a ``meshio.Mesh`` of triangles, quadrilaterals or polygons, in the plane or in space.
 
-    Cell data, cell sets and blocks come over; borders between blocks, sets, and groups of the names
-    that mesh generators use are kept.
+    Cell data, cell sets and blocks become data on faces. Borders of blocks, of sets, and of groups under
+    the names that mesh generators use are feature data.
     """
     blocks = [(i, block) for i, block in enumerate(mesh.cells) if block.type in _FACE_CELLS]
     _check_blocks(mesh, blocks)
@@ -93,7 +93,7 @@ def _to_meshio(mesh: Any, is_plane: bool, data: MeshData) -> Any:
 def write_meshio(
     mesh_type: Any, data: MeshData, is_plane: bool = False, field_data: Any = None
 ) -> Any:
-    """Make a ``meshio.Mesh``; blocks and sets come from data of their names."""
+    """Make a ``meshio.Mesh``, with the blocks and sets that `read_meshio` turned into data."""
     F, on_faces = data.F, dict(data.on_faces)
     block = on_faces.pop(_BLOCK, np.zeros(len(F), np.int64))
     members = [np.flatnonzero(block == b) for b in np.unique(block)]

@@ -1,7 +1,7 @@
-"""Mesh objects of other libraries, read and made without importing these: by what the objects can do.
+"""Mesh objects of other libraries, recognised by their attributes, so that no library is imported.
 
-trimesh.Trimesh, pyvista.PolyData, meshio.Mesh and open3d.geometry.TriangleMesh. A reader returns the
-arrays and what the mesh carries; its ``wrap`` makes a new object of the same type.
+These are trimesh.Trimesh, pyvista.PolyData, meshio.Mesh and open3d.geometry.TriangleMesh. A reader
+returns the mesh with its data, and a function ``wrap`` that makes a new object of the same type.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ __all__ = ["is_mesh_object", "read_object"]
 
 
 def is_mesh_object(value: Any) -> bool:
-    """Tell whether `read_object` may know this: it is no array, and has the marks of a mesh."""
+    """Tell whether a value has the attributes of a mesh that `read_object` knows."""
     return any(knows(value) for knows, _ in _KINDS)
 
 
 def read_object(mesh: Any) -> MeshData:
-    """Return the arrays of a mesh object, and what it carries.
+    """Return the arrays of a mesh object and its data.
 
     Raises
     ------
     MeshInputError
-        The object holds no triangles, or is none that we know.
+        The object holds no triangles, or its type is unknown.
     """
     for knows, read in _KINDS:
         if knows(mesh):
@@ -43,7 +43,7 @@ def read_object(mesh: Any) -> MeshData:
     if isinstance(mesh, str | os.PathLike):
         raise MeshInputError(f"{mesh} is a path: remesh_file remeshes files, read_mesh reads them")
     raise MeshInputError(
-        f"{type(mesh).__module__}.{type(mesh).__qualname__} is no mesh that is known here; "
+        f"{type(mesh).__module__}.{type(mesh).__qualname__} is not a mesh of a known type; "
         "give V and F, or an object of trimesh, pyvista, meshio or open3d"
     )
 
@@ -53,14 +53,14 @@ def _has(value: Any, *names: str) -> bool:
 
 
 def _rows(data: Any, count: int) -> Data:
-    """Arrays by name, those that have a row for each of so many elements."""
+    """Return the arrays by name that have ``count`` rows."""
     arrays = {str(name): np.asarray(data[name]) for name in data.keys()}  # noqa: SIM118
     return {name: x for name, x in arrays.items() if x.ndim >= 1 and len(x) == count}
 
 
 # -- trimesh ----------------------------------------------------------------------------------
 
-# Names that no attribute of a user has.
+# Names that do not collide with those of attributes.
 UV, COLOUR, MATERIAL = "visual:uv", "visual:colour", "visual:material"
 
 
@@ -123,7 +123,7 @@ def read_pyvista(mesh: Any) -> MeshData:
     """Read a ``pyvista.PolyData`` with point, cell and field data."""
     if not _has(mesh, "is_all_triangles", "regular_faces"):
         raise MeshInputError(
-            f"{type(mesh).__name__} is no surface; take mesh.extract_surface() of it"
+            f"{type(mesh).__name__} is not a surface; take mesh.extract_surface() of it"
         )
     others = mesh.n_lines + mesh.n_verts
     if others:
