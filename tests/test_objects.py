@@ -211,6 +211,9 @@ def test_meshio_cells_that_are_no_surface():
     meshio = pytest.importorskip("meshio")
     with pytest.raises(MeshInputError, match="tetra"):
         remesh(meshio.Mesh(np.eye(4, 3), [("tetra", [[0, 1, 2, 3]])]), 0.2)
+    for cells in (np.array([[0, 1, 2.5]]), np.array([[True, False, True]])):
+        with pytest.raises(MeshInputError, match="must hold integers"):
+            remesh(meshio.Mesh(V, [("triangle", cells)]), 0.2)
     lines = meshio.Mesh(V, [("line", F[:4, :2]), ("triangle", F)])
     with pytest.warns(UserWarning, match="line"):
         assert [b.type for b in remesh(lines, L).cells] == ["triangle"]

@@ -106,9 +106,10 @@ def write_data(path: FilePath, data: MeshData) -> list[str]:
     MeshFormatError
         The file cannot be written; an existing file of that name stays as it is.
     OptionError
-        ``path`` is not a path.
+        ``path`` is not a path, or ``data`` are not `MeshData`.
     """
     path = Path(arguments.path(path, "path"))
+    arguments.instance(data, "data", MeshData, "a MeshData")
     suffix = path.suffix.lower()
     carried = {*data.on_vertices, *data.on_faces, *data.on_corners}
     if suffix in SUFFIXES and (suffix not in (".obj", ".ply") or not carried):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.vocabulary import IntArray
 from ..errors import MeshInputError
 from ..mesh.polygons import fan_triangles
 from .mesh_data import Data, MeshData
@@ -78,12 +79,16 @@ def _check_blocks(mesh: Any, blocks: list[Any]) -> None:
         warnings.warn(f"{', '.join(sorted(left_out))} are not remeshed and left out", stacklevel=6)
 
 
-def _triangles(cells: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _triangles(cells: Any) -> tuple[IntArray, IntArray]:
     """Cut the cells of a block into triangles; returns also the cell of each."""
     if isinstance(cells, np.ndarray) and cells.ndim == 2:
-        return fan_triangles(cells.ravel(), np.full(len(cells), cells.shape[1]))
-    sizes = np.array([len(cell) for cell in cells], np.int64)
-    return fan_triangles(np.concatenate([np.empty(0, np.int64), *cells]), sizes)
+        corners, sizes = cells.ravel(), np.full(len(cells), cells.shape[1])
+    else:
+        corners = np.concatenate([np.empty(0, np.int64), *cells])
+        sizes = np.array([len(cell) for cell in cells], np.int64)
+    if corners.dtype.kind not in "iu":
+        raise MeshInputError(f"cells of meshio must hold integers; got dtype {corners.dtype}")
+    return fan_triangles(corners, sizes)
 
 
 def _to_meshio(mesh: Any, is_plane: bool, data: MeshData) -> Any:
