@@ -84,7 +84,7 @@ def _triangles(cells: Any) -> tuple[IntArray, IntArray]:
     if isinstance(cells, np.ndarray) and cells.ndim == 2:
         corners, sizes = cells.ravel(), np.full(len(cells), cells.shape[1])
     else:
-        corners = np.concatenate([np.empty(0, np.int64), *cells])
+        corners = np.concatenate([*cells]) if len(cells) else np.empty(0, np.int64)
         sizes = np.array([len(cell) for cell in cells], np.int64)
     if corners.dtype.kind not in "iu":
         raise MeshInputError(f"cells of meshio must hold integers; got dtype {corners.dtype}")
