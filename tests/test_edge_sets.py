@@ -108,11 +108,18 @@ def all_but_the_last_vertex(mesh):
 
 def run_owned(driver, mesh, blocks, limits, h, n_outcomes, *marks):
     """Run one candidate through the first stage; returns whether it was dealt with."""
-    candidates = np.full(mesh.origin.size, h, np.int32)
-    count = np.array([1, 0], np.int64)
+    candidates = one_candidate(3 * blocks.face, h)
     tally = np.zeros((2, n_outcomes), np.int64)
-    driver(False, mesh, blocks, OWNED, limits, candidates, count, *marks, tally)
-    return candidates[0] == edge_sets.DONE
+    driver(False, mesh, blocks, OWNED, limits, candidates, *marks, tally)
+    return candidates.items[0] == edge_sets.DONE
+
+
+def one_candidate(starts, candidate):
+    """List a candidate in the first of two blocks."""
+    candidates = edge_sets.make_candidates(starts)
+    candidates.items[0] = candidate
+    candidates.counts[0] = 1
+    return candidates
 
 
 def flip_owned(mesh, blocks, h):
@@ -185,7 +192,7 @@ def bisect_owned(V, F, a, b):
     blocks = Blocks(np.array([0, m + 2, m + 2]), np.array([0, n, n + 1]))
     mask = classify_edges(mesh, blocks, 1.0, 0.0, False).mask
     done, left = np.zeros(2, np.int64), np.zeros(2, np.int64)
-    bisect._bisect(False, mesh, blocks, OWNED, 0.5, 0.0, mask, done, left)
+    bisect._bisect(False, mesh, blocks, OWNED, (0.5, 0.0), mask, done, left)
     assert done.any() != left.any()
     return bool(done.any())
 
@@ -255,11 +262,9 @@ def test_a_move_owns_the_closed_ring_of_its_vertex():
     for v in (0, 5, centre):
         W, G, new = with_last(V, F, v)
         mesh = built(W, G)
-        candidates = np.full(len(W), new[centre], np.int32)
-        moved, count = np.zeros(len(W), np.uint8), np.array([1, 0])
-        tree = tree_of(mesh)
         blocks = all_but_the_last_vertex(mesh)
-        untangle._untangle(
-            False, mesh, blocks, OWNED, tree, False, np.cos(0.8), 0.0, candidates, count, moved
-        )
-        assert candidates[0] == new[centre] and not moved.any()
+        candidates = one_candidate(blocks.vertex, new[centre])
+        moved = np.zeros(len(W), np.uint8)
+        search = untangle.Search(False, np.cos(0.8), 0.0)
+        untangle._untangle(False, mesh, blocks, OWNED, tree_of(mesh), search, candidates, moved)
+        assert candidates.items[0] == new[centre] and not moved.any()

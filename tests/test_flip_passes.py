@@ -17,7 +17,7 @@ from structure import (
 )
 
 from remeshvec.core.vocabulary import DEAD
-from remeshvec.mesh.blocks import stages
+from remeshvec.mesh.blocks import make_candidates, stages
 from remeshvec.operations import flip
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.flip import (
@@ -64,11 +64,10 @@ class Passes:
         self.touched = np.zeros(len(mesh.X), np.uint8)
 
     def listed(self, find, *marks):
-        candidates = np.empty(self.mesh.origin.size, np.int32)
-        count = np.zeros(len(self.blocks.face) - 1, np.int64)
+        candidates = make_candidates(3 * self.blocks.face)
         ties = self.limits.delaunay_ties
-        find(False, self.mesh, self.blocks, ties, *marks, candidates, count)
-        return candidates, count
+        find(False, self.mesh, self.blocks, ties, *marks, candidates)
+        return candidates
 
     def all(self):
         return self.listed(flip._find_flips)
@@ -78,9 +77,12 @@ class Passes:
 
     def edges(self, listed):
         """As pairs of vertices; each once."""
-        candidates, count = listed
-        starts = 3 * self.blocks.face[:-1]
-        h = [i for k, n in zip(starts, count, strict=True) for i in candidates[k : k + n].tolist()]
+        starts = listed.starts[:-1]
+        h = [
+            i
+            for k, n in zip(starts, listed.counts, strict=True)
+            for i in listed.items[k : k + n].tolist()
+        ]
         found = [
             frozenset((int(self.mesh.origin[i]), int(self.mesh.origin[next_of(i)]))) for i in h
         ]
@@ -98,12 +100,11 @@ class Passes:
         )
 
     def run(self, listed):
-        candidates, count = listed
-        tally = np.zeros((len(count), N_FLIP_OUTCOMES), np.int64)
+        tally = np.zeros((len(listed.counts), N_FLIP_OUTCOMES), np.int64)
         for stage in stages(self.blocks):
             flip._flip(
-                False, self.mesh, self.blocks, stage, self.limits, candidates, count, self.touched, tally
-            )  # fmt: skip
+                False, self.mesh, self.blocks, stage, self.limits, listed, self.touched, tally
+            )
         return int(tally.sum(axis=0)[FLIPPED])
 
 

@@ -15,6 +15,7 @@ from remeshvec.core.geometry import point
 from remeshvec.core.vocabulary import FIXED, NON_MANIFOLD, NONE
 from remeshvec.features.curves import link_chains
 from remeshvec.features.polyline import (
+    Polylines,
     closest_on_curve,
     find_siblings,
     join_edges,
@@ -304,9 +305,9 @@ def test_arcs_around_a_loop_with_an_edge_of_no_length():
 
 
 @kernel
-def walk(X, origin, beside, arcs, edge, arc, found, parameter):
+def walk(polylines, edge, arc, found, parameter):
     for i in range(len(edge)):
-        found[i], parameter[i] = move_on_curve(beside, arcs, edge[i], arc[i])
+        found[i], parameter[i] = move_on_curve(polylines, edge[i], arc[i])
 
 
 @pytest.mark.parametrize("name", [*CREASED, "half_discs", "two_cubes", "double_bubble"])
@@ -320,7 +321,7 @@ def test_moves_end_at_the_arc_length(name):
     closed = arcs[2, start] > 0
     wanted = rng.uniform(-0.9, 1.9, 300) * total
     found, s = np.empty(300, np.int64), np.empty(300)
-    walk(mesh.X, mesh.origin, beside, arcs, start, wanted, found, s)
+    walk(Polylines(mesh.X, mesh.origin, beside, arcs), start, wanted, found, s)
     at = arcs[0, found] + s * (arcs[1, found] - arcs[0, found])
     expected = np.where(closed, wanted % total, np.clip(wanted, 0, total))
     away = np.abs(at - expected)
@@ -334,16 +335,17 @@ def test_moves_end_at_the_arc_length(name):
 
 
 @kernel
-def query(X, origin, beside, start, P, found, parameter, squared):
+def query(polylines, start, P, found, parameter, squared):
     for i in range(len(P)):
-        h, s, d = closest_on_curve(X, origin, beside, start[i], point(P, i))
+        h, s, d = closest_on_curve(polylines, start[i], point(P, i))
         found[i], parameter[i], squared[i] = h, s, d
 
 
 def closest(mesh, beside, start, P):
     """Edges, points and distances."""
     found, s, squared = np.empty(len(P), int), np.empty(len(P)), np.empty(len(P))
-    query(mesh.X, mesh.origin, beside, np.asarray(start, np.int64), P, found, s, squared)
+    polylines = Polylines(mesh.X, mesh.origin, beside, np.empty((3, 0)))
+    query(polylines, np.asarray(start, np.int64), P, found, s, squared)
     assert s.min() >= 0 and s.max() <= 1
     a = mesh.X[mesh.origin[found], :3]
     b = mesh.X[mesh.origin[[next_of(h) for h in found.tolist()]], :3]

@@ -9,7 +9,7 @@ from structure import assert_valid, blocks_of, built, faces_of, one_block
 
 from remeshvec.core.geometry import SHARP
 from remeshvec.core.vocabulary import CURVE, FIXED, HELD, NONE, PINNED
-from remeshvec.mesh.blocks import stages
+from remeshvec.mesh.blocks import make_candidates, stages
 from remeshvec.operations import relax
 from remeshvec.operations.relax import relax_vertices
 
@@ -83,11 +83,10 @@ def test_areas_are_mixed_voronoi_areas(name, per_block, monkeypatch):
     mesh = built(*bumpy(name), ordered=True)
     V, F = mesh.X[:, :3].copy(), faces_of(mesh).astype(np.int64)
     blocks = blocks_of(mesh, per_block, monkeypatch)
-    weighted, across = np.empty((len(V), 4)), np.empty(len(F), np.int32)
-    count = np.zeros(len(blocks.face) - 1, np.int64)
-    relax._sum_areas(False, mesh, blocks, weighted, across, count)
+    weighted, across = np.empty((len(V), 4)), make_candidates(blocks.face)
+    relax._sum_areas(False, mesh, blocks, weighted, across)
     for stage in stages(blocks)[1:]:
-        relax._sum_areas_across(False, mesh, blocks, stage, weighted, across, count)
+        relax._sum_areas_across(False, mesh, blocks, stage, weighted, across)
     areas = weighted[:, 3].copy()
     expected = igl.massmatrix(V, F, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
     assert areas == pytest.approx(expected, rel=1e-9)

@@ -6,15 +6,18 @@ that its two sides, and all sheets, look for a point in the same way.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..core.compiler import inlined, kernel
 from ..core.geometry import closest_on_segment, distance_squared, point
 from ..core.vocabulary import NONE, BoolArray, FloatArray, IndexArray
-from ..mesh.walk import ends_of, next_halfedge
+from ..mesh.walk import end_of, ends_of, next_halfedge
 from .curves import Curves
 
 __all__ = [
+    "Polylines",
     "closest_on_curve",
     "find_siblings",
     "join_edges",
@@ -22,6 +25,26 @@ __all__ = [
     "move_on_curve",
     "name_edges",
 ]
+
+
+class Polylines(NamedTuple):
+    """The polylines of all feature curves, indexed by the names of their edges.
+
+    Parameters
+    ----------
+    X : (n, 3) or (n, 4) float64
+        Vertices of the reference surface.
+    origin : (3 m,) int32
+    neighbours : (2, 3 m) int32
+        See `join_edges`.
+    arcs : (3, 3 m) float64
+        See `measure_arcs`.
+    """
+
+    X: FloatArray
+    origin: IndexArray
+    neighbours: IndexArray
+    arcs: FloatArray
 
 
 def name_edges(
@@ -202,43 +225,43 @@ def _may_share(X: FloatArray, ends: IndexArray) -> bool:
 
 
 @inlined
-def closest_on_curve(X, origin, curve_neighbours, start, p):
-    """Closest point of a curve near edge ``start``: edge, parameter, distance squared.
+def closest_on_curve(polylines, start, p):
+    """Find the point of a curve closest to ``p`` near edge ``start``: edge, parameter, squared distance.
 
-    Searched are the edges within three times the distance to ``start`` along the curve, on both
-    sides: a vertex stays on its own stretch where another comes close.
+    The search covers the edges within three times the distance to ``start`` along the curve, on both
+    sides, so that a vertex stays on its own stretch where another comes close.
     """
-    a = origin[start]
-    b = origin[next_halfedge(start)]
+    X, origin, neighbours, _ = polylines
+    a, b = origin[start], end_of(origin, start)
     best = start
     s, distance = closest_on_segment(p, point(X, a), point(X, b))
     reach = 3.0 * np.sqrt(distance)
-    for side in range(2 if curve_neighbours.shape[1] > 0 else 0):
+    for side in range(2 if neighbours.shape[1] > 0 else 0):
         before = start
-        h = np.int64(curve_neighbours[side, start])
+        h = neighbours[side, start]
         walked = 0.0
-        for _ in range(curve_neighbours.shape[1]):
+        for _ in range(neighbours.shape[1]):
             if walked > reach or h == start or h == NONE:
                 break
-            a = origin[h]
-            b = origin[next_halfedge(h)]
+            a, b = origin[h], end_of(origin, h)
             r, d = closest_on_segment(p, point(X, a), point(X, b))
             if d < distance:
                 best, s, distance = h, r, d
             walked += np.sqrt(
                 (X[a, 0] - X[b, 0]) ** 2 + (X[a, 1] - X[b, 1]) ** 2 + (X[a, 2] - X[b, 2]) ** 2
             )
-            after = np.int64(curve_neighbours[0, h])
+            after = neighbours[0, h]
             if after == before:
-                after = np.int64(curve_neighbours[1, h])
+                after = neighbours[1, h]
             before, h = h, after
     return best, s, distance
 
 
 @inlined
-def move_on_curve(curve_neighbours, arcs, edge, arc):
+def move_on_curve(polylines, edge, arc):
     """Go along a curve from an edge to an arc length; returns the edge and the parameter there."""
-    h = np.int64(edge)
+    _, _, neighbours, arcs = polylines
+    h = edge
     total = arcs[2, h]
     if total < 0.0:
         arc = min(max(arc, 0.0), -total)
@@ -246,7 +269,7 @@ def move_on_curve(curve_neighbours, arcs, edge, arc):
         arc += total
     elif arc > total:
         arc -= total
-    for _ in range(curve_neighbours.shape[1]):
+    for _ in range(neighbours.shape[1]):
         low = min(arcs[0, h], arcs[1, h])
         high = max(arcs[0, h], arcs[1, h])
         if low <= arc <= high:
@@ -256,7 +279,7 @@ def move_on_curve(curve_neighbours, arcs, edge, arc):
         if total > 0.0 and abs(arc - 0.5 * (low + high)) > 0.5 * total:
             ahead = not ahead
         end = 1 if (arcs[1, h] > arcs[0, h]) == ahead else 0
-        after = np.int64(curve_neighbours[end, h])
+        after = neighbours[end, h]
         if after == NONE:
             break
         h = after

@@ -14,28 +14,35 @@ So the result is that of one fixed sequence, however many threads run it, and no
 because it lies at a border. Independent sets by rounds [Luby 1986] cost 4 to 10 times the work and were
 dropped.
 
-A list of candidates is one array with a range of slots per face block. A stage sets each candidate that
-it has dealt with to ``DONE``.
+A phase lists its candidates once, block by block (`Candidates`), and visits them stage after stage:
+``for i in slots(candidates, blocks, stage, k)``. A stage sets a candidate that it has dealt with to
+``DONE``.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.compiler import inlined
-from ..core.vocabulary import Blocks, Mesh
+from ..core.vocabulary import Blocks, IndexArray, Mesh
 
 __all__ = [
     "DONE",
     "OWNED",
     "SHIFTED",
+    "Candidates",
     "face_range",
     "list_range",
     "make_blocks",
+    "make_candidates",
+    "owns",
+    "owns_all",
     "per_block",
     "per_stage_block",
+    "slots",
     "stages",
     "vertex_range",
 ]
@@ -48,6 +55,30 @@ DONE = -1
 # Faces per block. Smaller blocks balance better over threads, larger ones have fewer edges across
 # borders. A mesh of less than 1.5 blocks is one block and has no border.
 FACES_PER_BLOCK = 12288
+
+
+class Candidates(NamedTuple):
+    """Candidate lists of a phase, one per block.
+
+    Parameters
+    ----------
+    items : (k,) int32
+        Half-edges, faces or vertices; ``DONE`` once dealt with.
+    starts : (b + 1,) int64
+        Slot in ``items`` where the list of each block begins; lists need not fill their slots.
+    counts : (b,) int64
+        Candidates of each block.
+    """
+
+    items: IndexArray
+    starts: NDArray[np.int64]
+    counts: NDArray[np.int64]
+
+
+def make_candidates(starts: NDArray[np.int64]) -> Candidates:
+    """Allocate empty lists, see `Candidates`; a block needs no more slots than it has elements."""
+    counts = np.zeros(len(starts) - 1, np.int64)
+    return Candidates(np.empty(int(starts[-1]), np.int32), starts, counts)
 
 
 def make_blocks(mesh: Mesh) -> Blocks:
@@ -127,11 +158,33 @@ def _stage_range(ends, stage, k):
 
 
 @inlined
+def owns(owned, v):
+    """Tell whether a vertex range (low, high) holds a vertex."""
+    return owned[0] <= v < owned[1]
+
+
+@inlined
+def owns_all(owned, a, b, c):
+    """Tell whether a vertex range holds three vertices, such as the corners of a face."""
+    return min(a, b, c) >= owned[0] and max(a, b, c) < owned[1]
+
+
+@inlined
 def list_range(blocks, stage, k):
     """Return the first and the end of the candidate lists that block ``k`` of a stage reads."""
     if stage == SHIFTED:
         return np.int64(k), np.int64(k) + 2
     return _groups(blocks.face.size - 1, stage, k)
+
+
+@inlined
+def slots(candidates, blocks, stage, k):
+    """Yield the slots of all candidates that block ``k`` of a stage reads, in order."""
+    first, end = list_range(blocks, stage, k)
+    for j in range(first, end):
+        start = candidates.starts[j]
+        for i in range(start, start + candidates.counts[j]):  # noqa: UP028  no `yield from` in Numba
+            yield i
 
 
 @inlined

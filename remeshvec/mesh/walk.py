@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 
 from ..core.compiler import inlined
 
-__all__ = ["ends_of", "next_halfedge", "next_spoke", "previous_halfedge"]
+__all__ = [
+    "apex_of",
+    "corners_of",
+    "end_of",
+    "ends_of",
+    "next_halfedge",
+    "next_spoke",
+    "previous_halfedge",
+]
 
 
 @inlined
@@ -28,6 +36,24 @@ def previous_halfedge(h):
 def next_spoke(twin, h):
     """Return the next half-edge counter-clockwise around an origin; ``NONE`` at the boundary."""
     return np.int64(twin[previous_halfedge(h)])
+
+
+@inlined
+def end_of(origin, h):
+    """Return the vertex where a half-edge ends."""
+    return origin[next_halfedge(h)]
+
+
+@inlined
+def apex_of(origin, h):
+    """Return the vertex opposite a half-edge in its face."""
+    return origin[previous_halfedge(h)]
+
+
+@inlined
+def corners_of(origin, f):
+    """Return the three vertices of a face."""
+    return origin[3 * f], origin[3 * f + 1], origin[3 * f + 2]
 
 
 def ends_of(origin: NDArray[Any], h: NDArray[Any]) -> NDArray[Any]:

@@ -1,7 +1,7 @@
-"""Measure all edges once a sweep: which are too long, which too short.
+"""Classify all edges once per sweep: too long, too short, or neither.
 
-Splits and collapses read the answer from one byte a face. The round in which no edge is too long any
-more has measured the mesh that the collapses start from.
+Splits and collapses read the answer from one byte per face. The last round of splits, in which no edge
+is too long any more, has classified the mesh that the collapses start from.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from ..core.compiler import inlined, threaded
 from ..core.geometry import area_vector, distance_squared
-from ..core.vocabulary import DEAD, FROZEN, Blocks, Mesh
+from ..core.vocabulary import DEAD, Blocks, Mesh
 from ..mesh.blocks import per_block
+from ..mesh.edge_curves import is_locked
+from ..mesh.walk import corners_of
 
 __all__ = ["REMOVED", "EdgeFlags", "classify_edges", "edge_flags", "is_short"]
 
@@ -27,13 +29,14 @@ class EdgeFlags(NamedTuple):
     Parameters
     ----------
     mask : (m,) uint8
-        Bit i: the face wants the edge from corner i split; bit 3 + i: that edge is short; ``REMOVED``.
+        Bit i: the face wants the edge from corner i split; bit 3 + i: that edge is short; ``REMOVED``
+        for a removed face.
     n_long : int
-        Edges to split, twice where both faces want that.
+        Edges to split; an edge counts twice where both faces want it split.
     n_gone : int
         Removed faces.
     longest, shortest : float
-        Factors of the target length that were compared with.
+        Limits, as factors of the target length.
     """
 
     mask: NDArray[np.uint8]
@@ -46,10 +49,10 @@ class EdgeFlags(NamedTuple):
 def classify_edges(
     mesh: Mesh, blocks: Blocks, longest: float, shortest: float, parallel: bool
 ) -> EdgeFlags:
-    """Compare all edges with two factors of the target lengths at their ends.
+    """Compare all edges with two limits, given as factors of the target lengths at their ends.
 
-    An edge is too long above the arithmetic mean, too short below the harmonic one: where lengths jump,
-    beside an edge that must not be split, there is room between the two.
+    An edge is too long above the arithmetic mean of both lengths, too short below the harmonic mean.
+    Where lengths jump, the gap between the two means stops splits and collapses from alternating.
     """
     mask = np.empty(mesh.origin.size // 3, np.uint8)
     count = np.zeros((len(blocks.face) - 1, 2), np.int64)
@@ -60,6 +63,7 @@ def classify_edges(
 
 @threaded(per_block)
 def _classify(span, mesh, blocks, half_longest, twice_shortest, mask, count):
+    """Write the flags of every face; ``count`` gets long edges and removed faces per block."""
     for k in range(span[0], span[1]):
         n_long = 0
         n_gone = 0
@@ -80,7 +84,7 @@ def _classify(span, mesh, blocks, half_longest, twice_shortest, mask, count):
 def edge_flags(mesh, f, half_longest, twice_shortest):
     """Compute the flags of one face, see `EdgeFlags`."""
     X = mesh.X
-    a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
+    a, b, c = corners_of(mesh.origin, f)
     l0 = distance_squared(X, a, b)
     l1 = distance_squared(X, b, c)
     l2 = distance_squared(X, c, a)
@@ -94,37 +98,38 @@ def edge_flags(mesh, f, half_longest, twice_shortest):
     mask = (l0 > m0 * m0) + 2 * (l1 > m1 * m1) + 4 * (l2 > m2 * m2)
     if mask == 0:
         return short
-    return short | _to_split(mesh, f, mask, l0, l1, l2, (m0 + m1 + m2) / 3.0)
+    return short | _edges_to_split(mesh, f, mask, (l0, l1, l2), (m0 + m1 + m2) / 3.0)
 
 
 @inlined
 def is_short(length_squared, s, t, factor):
-    """Tell whether an edge is shorter than a factor of the harmonic mean of its ends' lengths."""
+    """Tell whether an edge is shorter than a factor of the harmonic mean of both target lengths."""
     return _is_below(length_squared, s, t, 2.0 * factor)
 
 
 @inlined
 def _is_below(length_squared, s, t, twice_factor):
+    """`is_short` without a division."""
     total = s + t
     product = twice_factor * (s * t)  # the same bits from both sides
     return length_squared * total * total < product * product
 
 
 @inlined
-def _to_split(mesh, f, mask, l0, l1, l2, limit):
-    """Of the long edges those that a face wants split: not the frozen ones.
+def _edges_to_split(mesh, f, mask, lengths_squared, limit):
+    """Select the long edges that a face wants split: no locked ones.
 
-    A face lower than half the limit wants only its longest edge split: all three at once, a needle of
-    length l would fall into (l / L)^2 faces instead of 2 l / L.
+    A face lower than half the limit wants only its longest edge split. If all three were split at once,
+    a needle of length l would fall into (l / L)^2 faces instead of 2 l / L.
     """
     for i in range(3):
-        if mesh.curve[3 * f + i] <= FROZEN:
+        if is_locked(mesh.curve[3 * f + i]):
             mask &= ~(1 << i)
     if mask == 0 or mask == 1 or mask == 2 or mask == 4:
         return mask
-    X = mesh.X
-    a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
-    nx, ny, nz = area_vector(X, a, b, c)
+    a, b, c = corners_of(mesh.origin, f)
+    nx, ny, nz = area_vector(mesh.X, a, b, c)
+    l0, l1, l2 = lengths_squared
     l0 *= mask & 1
     l1 *= (mask >> 1) & 1
     l2 *= (mask >> 2) & 1

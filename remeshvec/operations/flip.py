@@ -15,8 +15,18 @@ import numpy as np
 from ..core.compiler import inlined, threaded
 from ..core.geometry import area_vector, distance_squared, is_flat, mean_ratio, turn_exceeds
 from ..core.vocabulary import CURVE, DEAD, MAX_VALENCE, NONE, Blocks, Mesh
-from ..mesh.blocks import DONE, list_range, per_block, per_stage_block, stages, vertex_range
-from ..mesh.walk import next_halfedge, previous_halfedge
+from ..mesh.blocks import (
+    DONE,
+    make_candidates,
+    owns,
+    per_block,
+    per_stage_block,
+    slots,
+    stages,
+    vertex_range,
+)
+from ..mesh.edge_curves import is_feature
+from ..mesh.walk import apex_of, corners_of, end_of, next_halfedge, next_spoke
 from .outcomes import (
     FLIPPED,
     KEPT_DUPLICATE,
@@ -41,86 +51,86 @@ class FlipLimits(NamedTuple):
 def flip_edges(
     mesh: Mesh, blocks: Blocks, limits: FlipLimits, parallel: bool, passes: int = 1
 ) -> np.ndarray:
-    """Flip every edge whose flip is worth it, once a pass; returns counts by outcome.
+    """Flip every edge that gains from it, once per pass; returns counts by outcome.
 
-    Later passes look at what the one before has touched: all else stays as it was, and for the same
-    reasons.
+    Later passes look only at edges that the previous pass has touched: all others would be refused
+    again, for the same reasons.
     """
-    candidates = np.empty(mesh.origin.size, np.int32)
+    candidates = make_candidates(3 * blocks.face)
     touched = np.zeros(mesh.vertex_halfedge.size, np.uint8)
     total = np.zeros(N_FLIP_OUTCOMES, np.int64)
     for n in range(passes):
-        count = np.zeros(len(blocks.face) - 1, np.int64)
         if n == 0:
-            _find_flips(parallel, mesh, blocks, limits.delaunay_ties, candidates, count)
+            _find_flips(parallel, mesh, blocks, limits.delaunay_ties, candidates)
         else:
-            _find_again(parallel, mesh, blocks, limits.delaunay_ties, touched, candidates, count)
-        if not count.any():
+            _find_again(parallel, mesh, blocks, limits.delaunay_ties, touched, candidates)
+        if not candidates.counts.any():
             break
-        tally = np.zeros((len(count), N_FLIP_OUTCOMES), np.int64)
+        tally = np.zeros((len(blocks.face) - 1, N_FLIP_OUTCOMES), np.int64)
         for stage in stages(blocks):
             tally[:, NOT_OWNED] = 0
-            _flip(parallel, mesh, blocks, stage, limits, candidates, count, touched, tally)
+            _flip(parallel, mesh, blocks, stage, limits, candidates, touched, tally)
         total += tally.sum(axis=0)
     return total
 
 
 @threaded(per_block)
-def _find_flips(span, mesh, blocks, delaunay_ties, candidates, count):
-    """List the edges worth a flip, by two sieves without branches, which could not be predicted.
+def _find_flips(span, mesh, blocks, delaunay_ties, candidates):
+    """List the edges to flip, by two sieves without branches, which no processor could predict.
 
-    A flip takes an edge from both ends and gives one to both apexes. It gains something where three of
-    the four are better off, nothing where two are; so of the three in one face at least one is.
+    A flip takes an edge from both ends and gives one to both apexes. It gains if three of the four are
+    better off, and loses nothing if two are; so of the three in one face at least one is better off.
     """
+    item = candidates.items
     for k in range(span[0], span[1]):
-        start = 3 * blocks.face[k]
+        start = candidates.starts[k]
         end = start
         for f in range(blocks.face[k], blocks.face[k + 1]):
             if mesh.origin[3 * f] == DEAD:
                 continue
-            ea = mesh.valence_excess[mesh.origin[3 * f]]
-            eb = mesh.valence_excess[mesh.origin[3 * f + 1]]
-            ec = mesh.valence_excess[mesh.origin[3 * f + 2]]
+            a, b, c = corners_of(mesh.origin, f)
+            ea, eb, ec = mesh.valence_excess[a], mesh.valence_excess[b], mesh.valence_excess[c]
             for i in range(3):
                 h = 3 * f + i
                 t = mesh.twin[h]
-                candidates[end] = h
+                item[end] = h
                 end += (t < h) & (t != NONE) & ((ea > 0) | (eb > 0) | (ec < 0))
                 ea, eb, ec = eb, ec, ea
         sieved = start
         for i in range(start, end):
-            h = np.int64(candidates[i])
-            candidates[sieved] = h
-            sieved += valence_gain(mesh, h, np.int64(mesh.twin[h])) >= 0
+            h = item[i]
+            item[sieved] = h
+            sieved += valence_gain(mesh, h, mesh.twin[h]) >= 0
         end = sieved
         sieved = start
         for i in range(start, end):
-            h = np.int64(candidates[i])
-            candidates[sieved] = h
-            sieved += _is_wanted(mesh, h, np.int64(mesh.twin[h]), delaunay_ties)
-        count[k] = sieved - start
+            h = item[i]
+            item[sieved] = h
+            sieved += _is_wanted(mesh, h, mesh.twin[h], delaunay_ties)
+        candidates.counts[k] = sieved - start
 
 
 @threaded(per_block)
-def _find_again(span, mesh, blocks, delaunay_ties, touched, candidates, count):
-    """List what is worth a flip around touched vertices: each edge by one of its two faces."""
+def _find_again(span, mesh, blocks, delaunay_ties, touched, candidates):
+    """List the edges to flip around touched vertices, each by one of its two faces."""
     for k in range(span[0], span[1]):
-        end = 3 * blocks.face[k]
+        end = candidates.starts[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
             if mesh.origin[3 * f] == DEAD or not _is_touched(mesh, f, touched):
                 continue
             for h in range(3 * f, 3 * f + 3):
-                t = np.int64(mesh.twin[h])
+                t = mesh.twin[h]
                 if t != NONE and (t < h or not _is_touched(mesh, t // 3, touched)):
-                    candidates[end] = h
+                    candidates.items[end] = h
                     end += _is_wanted(mesh, h, t, delaunay_ties)
-        count[k] = end - 3 * blocks.face[k]
+        candidates.counts[k] = end - candidates.starts[k]
 
 
 @inlined
 def _is_touched(mesh, f, touched):
-    origin = mesh.origin
-    return touched[origin[3 * f]] | touched[origin[3 * f + 1]] | touched[origin[3 * f + 2]]
+    """Tell whether a corner of a face is marked."""
+    a, b, c = corners_of(mesh.origin, f)
+    return touched[a] | touched[b] | touched[c]
 
 
 @inlined
@@ -128,40 +138,35 @@ def _is_wanted(mesh, h, t, delaunay_ties):
     """Tell whether a flip gains valence, or keeps it and restores Delaunay."""
     gain = valence_gain(mesh, h, t)
     wanted = gain > 0 or (gain == 0 and delaunay_ties and violates_delaunay(mesh, h, t))
-    return wanted and mesh.curve[h] == NONE
+    return wanted and not is_feature(mesh.curve[h])
 
 
 @threaded(per_stage_block)
-def _flip(span, mesh, blocks, stage, limits, candidates, count, touched, tally):
+def _flip(span, mesh, blocks, stage, limits, candidates, touched, tally):
+    """Flip the candidates that the blocks of a stage own."""
     for k in range(span[0], span[1]):
-        low, high = vertex_range(blocks, stage, k)
-        first, end = list_range(blocks, stage, k)
-        for j in range(first, end):
-            for i in range(3 * blocks.face[j], 3 * blocks.face[j] + count[j]):
-                h = np.int64(candidates[i])
-                if h == DONE:
-                    continue
-                v = mesh.origin[h]
-                if v < low or v >= high:
-                    continue
-                outcome = _flip_edge(mesh, h, low, high, limits, touched)
-                tally[k, outcome] += 1
-                if outcome != NOT_OWNED:
-                    candidates[i] = DONE
+        owned = vertex_range(blocks, stage, k)
+        for i in slots(candidates, blocks, stage, k):
+            h = candidates.items[i]
+            if h == DONE or not owns(owned, mesh.origin[h]):
+                continue
+            outcome = _flip_edge(mesh, h, owned, limits, touched)
+            tally[k, outcome] += 1
+            if outcome != NOT_OWNED:
+                candidates.items[i] = DONE
 
 
 @inlined
-def _flip_edge(mesh, h, low, high, limits, touched):
-    """Flip one edge if it is still worth it and every guard agrees; returns the outcome."""
-    b = mesh.origin[next_halfedge(h)]
-    c = mesh.origin[previous_halfedge(h)]
-    if b < low or b >= high or c < low or c >= high:
+def _flip_edge(mesh, h, owned, limits, touched):
+    """Flip one edge if it still gains from it and every guard agrees; returns the outcome."""
+    a, b, c = mesh.origin[h], end_of(mesh.origin, h), apex_of(mesh.origin, h)
+    if not (owns(owned, b) and owns(owned, c)):
         return NOT_OWNED
-    t = np.int64(mesh.twin[h])
+    t = mesh.twin[h]
     if t == NONE:
         return NO_LONGER_WANTED
-    d = mesh.origin[previous_halfedge(t)]
-    if d < low or d >= high:
+    d = apex_of(mesh.origin, t)
+    if not owns(owned, d):
         return NOT_OWNED
     if not _is_wanted(mesh, h, t, limits.delaunay_ties):
         return NO_LONGER_WANTED
@@ -171,26 +176,28 @@ def _flip_edge(mesh, h, low, high, limits, touched):
         return KEPT_NORMAL
     if limits.sliver_check and flip_makes_sliver(mesh, h, t):
         return KEPT_SLIVER
-    touched[mesh.origin[h]] = 1
-    touched[b] = 1
-    touched[c] = 1
-    touched[d] = 1
+    for v in (a, b, c, d):
+        touched[v] = 1
     _turn_edge(mesh, h, t)
     return FLIPPED
 
 
 @inlined
+def _quad_of(mesh, h, t):
+    """Return the vertices of the quad around an edge: its ends a and b, the apexes c and d."""
+    origin = mesh.origin
+    return origin[h], origin[t], apex_of(origin, h), apex_of(origin, t)
+
+
+@inlined
 def valence_gain(mesh, h, t):
-    """Fall of the summed distance from the ideal valences; negative where an end has too few edges."""
+    """Fall of the summed distance from the ideal valences; negative if an end has too few edges."""
+    a, b, c, d = _quad_of(mesh, h, t)
     excess = mesh.valence_excess
-    a = excess[mesh.origin[h]]
-    b = excess[mesh.origin[t]]
-    c = excess[mesh.origin[previous_halfedge(h)]]
-    d = excess[mesh.origin[previous_halfedge(t)]]
-    # Each of the four comes one nearer to its ideal, or one farther away.
-    nearer = np.int64(a > 0) + np.int64(b > 0) + np.int64(c < 0) + np.int64(d < 0)
-    gain = 2 * nearer - 4
-    return -1 if min(a, b) <= -3 else gain
+    ea, eb, ec, ed = excess[a], excess[b], excess[c], excess[d]
+    # Each of the four comes one nearer to its ideal, or goes one farther away.
+    gain = 2 * (ea > 0) + 2 * (eb > 0) + 2 * (ec < 0) + 2 * (ed < 0) - 4
+    return -1 if min(ea, eb) <= -3 else gain
 
 
 @inlined
@@ -207,9 +214,7 @@ def violates_delaunay(mesh, h, t):
 def _dot_opposite(mesh, h):
     """Scalar product of the two edges that meet opposite a half-edge."""
     X = mesh.X
-    a = mesh.origin[h]
-    b = mesh.origin[next_halfedge(h)]
-    c = mesh.origin[previous_halfedge(h)]
+    a, b, c = mesh.origin[h], end_of(mesh.origin, h), apex_of(mesh.origin, h)
     return (
         (X[a, 0] - X[c, 0]) * (X[b, 0] - X[c, 0])
         + (X[a, 1] - X[c, 1]) * (X[b, 1] - X[c, 1])
@@ -220,11 +225,8 @@ def _dot_opposite(mesh, h):
 @inlined
 def _cotangent(mesh, h, dot):
     """Cotangent of the angle opposite a half-edge; far below zero for a face without area."""
-    X = mesh.X
-    a = mesh.origin[h]
-    b = mesh.origin[next_halfedge(h)]
-    c = mesh.origin[previous_halfedge(h)]
-    nx, ny, nz = area_vector(X, a, b, c)
+    a, b, c = mesh.origin[h], end_of(mesh.origin, h), apex_of(mesh.origin, h)
+    nx, ny, nz = area_vector(mesh.X, a, b, c)
     norm = sqrt(nx * nx + ny * ny + nz * nz)
     if norm == 0.0:
         return 0.0 if dot == 0.0 else (1e30 if dot > 0.0 else -1e30)
@@ -236,15 +238,15 @@ def duplicates_edge(mesh, c, d):
     """Guard: the new edge exists already, or both its ends are the same vertex."""
     if c == d:
         return True
-    start = np.int64(mesh.vertex_halfedge[c])
+    start = mesh.vertex_halfedge[c]
     h = start
     for _ in range(MAX_VALENCE):
-        if mesh.origin[next_halfedge(h)] == d:
+        if end_of(mesh.origin, h) == d:
             return True
-        p = previous_halfedge(h)
-        h = np.int64(mesh.twin[p])
+        last = h
+        h = next_spoke(mesh.twin, h)
         if h == NONE:
-            return mesh.origin[p] == d
+            return apex_of(mesh.origin, last) == d
         if h == start:
             return False
     return True
@@ -255,13 +257,10 @@ def bends_quad(mesh, h, t, cosine):
     """Guard: a new face would turn too far from the quad's mean normal.
 
     The old and the new pair of triangles have the same summed area vector, which is that normal.
-    Comparing with the old faces instead keeps caps from flipping away: their normals are noise.
+    Comparing with the old faces instead would keep caps from flipping away: their normals are noise.
     """
     X = mesh.X
-    a = mesh.origin[h]
-    b = mesh.origin[t]
-    c = mesh.origin[previous_halfedge(h)]
-    d = mesh.origin[previous_halfedge(t)]
+    a, b, c, d = _quad_of(mesh, h, t)
     u = ux, uy, uz = area_vector(X, a, d, c)
     w = wx, wy, wz = area_vector(X, b, c, d)
     mean = ux + wx, uy + wy, uz + wz
@@ -278,16 +277,15 @@ def bends_quad(mesh, h, t, cosine):
 @inlined
 def flip_makes_sliver(mesh, h, t):
     """Guard (optional): the worse of the two triangles would get worse."""
-    a = mesh.origin[h]
-    b = mesh.origin[t]
-    c = mesh.origin[previous_halfedge(h)]
-    d = mesh.origin[previous_halfedge(t)]
-    before = min(_flip_shape(mesh.X, a, b, c), _flip_shape(mesh.X, b, a, d))
-    return min(_flip_shape(mesh.X, a, d, c), _flip_shape(mesh.X, b, c, d)) < before
+    X = mesh.X
+    a, b, c, d = _quad_of(mesh, h, t)
+    before = min(_flip_shape(X, a, b, c), _flip_shape(X, b, a, d))
+    return min(_flip_shape(X, a, d, c), _flip_shape(X, b, c, d)) < before
 
 
 @inlined
 def _flip_shape(X, a, b, c):
+    """Mean ratio of the triangle of three vertices."""
     nx, ny, nz = area_vector(X, a, b, c)
     return mean_ratio(
         distance_squared(X, a, b),
@@ -305,14 +303,11 @@ def _turn_edge(mesh, h, t):
     """
     origin = mesh.origin
     twin = mesh.twin
+    a, b, c, d = _quad_of(mesh, h, t)
     hn = next_halfedge(h)
     tn = next_halfedge(t)
-    a = np.int64(origin[h])
-    b = np.int64(origin[t])
-    c = np.int64(origin[previous_halfedge(h)])
-    d = np.int64(origin[previous_halfedge(t)])
-    bc = np.int64(twin[hn])
-    ad = np.int64(twin[tn])
+    bc = twin[hn]
+    ad = twin[tn]
     twin[h] = ad
     if ad != NONE:
         twin[ad] = h

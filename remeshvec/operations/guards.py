@@ -1,14 +1,11 @@
-"""Guards of a collapse: each says of one thing whether the mesh would be worse off.
+"""Guards of a collapse: each tells for one property of the mesh whether a collapse would spoil it.
 
-A collapse moves the ends a and b of an edge to one place. Row 0 of `Rings` is the ring of a, row 1 that
-of b.
+A collapse moves the ends a and b of an edge to one place; places and rings as in `rings`.
 """
 
 from __future__ import annotations
 
 from math import sqrt
-
-import numpy as np
 
 from ..core.compiler import inlined
 from ..core.geometry import (
@@ -20,7 +17,10 @@ from ..core.geometry import (
     turn_exceeds,
 )
 from ..core.vocabulary import CURVE, INNER, NONE
-from ..mesh.walk import next_halfedge, previous_halfedge
+from ..mesh.blocks import owns
+from ..mesh.edge_curves import is_feature, is_named
+from ..mesh.walk import apex_of, end_of, next_halfedge, next_spoke, previous_halfedge
+from .rings import is_too_far, place_of
 
 __all__ = [
     "collapse_makes_sliver",
@@ -29,6 +29,7 @@ __all__ = [
     "keeps_curves",
     "keeps_link",
     "overshoots",
+    "overshoots_ahead",
 ]
 
 
@@ -36,15 +37,15 @@ __all__ = [
 def keeps_curves(mesh, h, a, b):
     """Guard: fixed and held vertices stay, and a vertex of a curve leaves along this curve only.
 
-    Of the face beside a vanishing edge at most one other edge may be on a curve, since the two become
-    one; a boundary edge stays where its face hangs on it alone.
+    The other two edges of each vanishing face become one, so at most one of them may be on a curve. A
+    boundary edge stays if it is all that connects its face to the mesh.
     """
     kind = min(mesh.kind[a], mesh.kind[b])
     if kind == INNER:
         return True
-    if kind != CURVE or mesh.curve[h] < 0:
+    if kind != CURVE or not is_named(mesh.curve[h]):
         return False
-    t = np.int64(mesh.twin[h])
+    t = mesh.twin[h]
     if joins_curves(mesh, h) or (t != NONE and joins_curves(mesh, t)):
         return False
     return t != NONE or (
@@ -55,15 +56,34 @@ def keeps_curves(mesh, h, a, b):
 @inlined
 def joins_curves(mesh, h):
     """Tell whether both other edges of a face are on curves."""
-    return mesh.curve[next_halfedge(h)] != NONE and mesh.curve[previous_halfedge(h)] != NONE
+    return is_feature(mesh.curve[next_halfedge(h)]) and is_feature(mesh.curve[previous_halfedge(h)])
+
+
+@inlined
+def overshoots_ahead(mesh, h, place, owned, half_factor):
+    """Guard, incomplete but fast: the edge to the vertex straight ahead of either end would be too long.
+
+    That is the third vertex of both rings, straight ahead in most of them.
+    """
+    for side in range(2):
+        g = mesh.twin[h] if side else h
+        for _ in range(3):
+            if g != NONE:
+                g = next_spoke(mesh.twin, g)
+        if g == NONE:
+            continue
+        w = end_of(mesh.origin, g)
+        if owns(owned, w) and is_too_far(place, place_of(mesh.X, w), half_factor, 1.0):
+            return True
+    return False
 
 
 @inlined
 def keeps_link(mesh, h, rings):
-    """Guard: the link condition, link(a) and link(b) meet in link(ab) only.
+    """Guard: the link condition, link(a) and link(b) meet in link(ab) only [Dey et al. 1999].
 
-    [Dey et al. 1999]: the common neighbours are the apexes of the edge's faces, and a tetrahedron,
-    whose links share an edge too, stays.
+    The common neighbours must be the apexes of the edge's faces. A tetrahedron, whose links share an
+    edge too, stays.
     """
     size = rings.size
     common = 0
@@ -77,29 +97,28 @@ def keeps_link(mesh, h, rings):
 
 
 @inlined
-def overshoots(rings, x, y, z, s, a, b, half_factor):
-    """Guard: an edge from the new position to a ring would be too long for the length ``s`` there."""
+def overshoots(rings, place, a, b, half_factor):
+    """Guard: an edge from the new place to a ring vertex would be too long, see `is_too_far`."""
+    at = rings.place
     for side in range(2):
         other = a if side else b
         for i in range(rings.size[side, 1]):
-            dx = rings.point[side, i, 0] - x
-            dy = rings.point[side, i, 1] - y
-            dz = rings.point[side, i, 2] - z
-            limit = half_factor * (s + rings.point[side, i, 3])
-            if rings.vertex[side, i] != other and dx * dx + dy * dy + dz * dz > limit * limit:
+            there = at[side, i, 0], at[side, i, 1], at[side, i, 2], at[side, i, 3]
+            if rings.vertex[side, i] != other and is_too_far(place, there, half_factor, 1.0):
                 return True
     return False
 
 
 @inlined
-def folds_over(mesh, x, y, z, kind, a, b, rings, cosine):
+def folds_over(mesh, place, kind, a, b, rings, cosine):
     """Guard: a face that stays would turn its normal too far, or lose its area.
 
-    ``kind`` is that of the vertex that stays. On a curve, faces whose corners all lie on curves may
-    become flat along a straight one, with a normal that is rounding.
+    ``kind`` is that of the vertex that stays. On a straight curve, a face with all corners on curves may
+    become flat, and its normal is then rounding noise; such a collapse is refused too.
     """
-    at = rings.point
+    at = rings.place
     normal = rings.normal
+    p = place[0], place[1], place[2]
     for side in range(2):
         other = a if side else b
         for i in range(rings.size[side, 0]):
@@ -108,50 +127,61 @@ def folds_over(mesh, x, y, z, kind, a, b, rings, cosine):
             w = rings.vertex[side, j]
             if v == other or w == other:
                 continue
-            vx, vy, vz = at[side, i, 0], at[side, i, 1], at[side, i, 2]
-            wx, wy, wz = at[side, j, 0], at[side, j, 1], at[side, j, 2]
-            nx, ny, nz = face_vector((x, y, z), (vx, vy, vz), (wx, wy, wz))
+            pv = at[side, i, 0], at[side, i, 1], at[side, i, 2]
+            pw = at[side, j, 0], at[side, j, 1], at[side, j, 2]
+            new = nx, ny, nz = face_vector(p, pv, pw)
             if normal[side, i, 3] == 0.0:
                 if nx == 0.0 and ny == 0.0 and nz == 0.0:
                     return True
-            elif turn_exceeds(
-                (normal[side, i, 0], normal[side, i, 1], normal[side, i, 2]), (nx, ny, nz), cosine
-            ):
-                return True
-            if kind >= CURVE and mesh.kind[v] >= CURVE and mesh.kind[w] >= CURVE:
-                longest = max(
-                    (wx - vx) ** 2 + (wy - vy) ** 2 + (wz - vz) ** 2,
-                    (vx - x) ** 2 + (vy - y) ** 2 + (vz - z) ** 2,
-                    (wx - x) ** 2 + (wy - y) ** 2 + (wz - z) ** 2,
-                )
-                if is_flat(nx, ny, nz, longest):
+            else:
+                old = normal[side, i, 0], normal[side, i, 1], normal[side, i, 2]
+                if turn_exceeds(old, new, cosine):
                     return True
+            on_curves = kind >= CURVE and mesh.kind[v] >= CURVE and mesh.kind[w] >= CURVE
+            if on_curves and is_flat(nx, ny, nz, _longest_squared(p, pv, pw)):
+                return True
     return False
 
 
 @inlined
-def collapse_makes_sliver(mesh, x, y, z, a, b, faces, n_a, n_b):
-    """Guard (optional): the worst triangle after would be worse than the worst before."""
+def _longest_squared(p, v, w):
+    """Squared length of the longest side of a triangle."""
+    x, y, z = p
+    vx, vy, vz = v
+    wx, wy, wz = w
+    return max(
+        (wx - vx) ** 2 + (wy - vy) ** 2 + (wz - vz) ** 2,
+        (vx - x) ** 2 + (vy - y) ** 2 + (vz - z) ** 2,
+        (wx - x) ** 2 + (wy - y) ** 2 + (wz - z) ** 2,
+    )
+
+
+@inlined
+def collapse_makes_sliver(mesh, place, a, b, rings):
+    """Guard (optional): the worst triangle after the collapse would be worse than the worst before."""
     X = mesh.X
     before = 1.0
     after = 1.0
     for side in range(2):
         other = b if side == 0 else a
-        for i in range(n_a if side == 0 else n_b):
-            h = faces[side, i]
+        for i in range(rings.size[side, 0]):
+            h = rings.face[side, i]
             u = mesh.origin[h]
-            v = mesh.origin[next_halfedge(h)]
-            w = mesh.origin[previous_halfedge(h)]
+            v = end_of(mesh.origin, h)
+            w = apex_of(mesh.origin, h)
             opposite = distance_squared(X, v, w)
-            before = min(before, _worst_shape(X, X[u, 0], X[u, 1], X[u, 2], v, w, opposite))
+            before = min(before, _shape(X, point(X, u), v, w, opposite))
             if v != other and w != other:
-                after = min(after, _worst_shape(X, x, y, z, v, w, opposite))
+                p = place[0], place[1], place[2]
+                after = min(after, _shape(X, p, v, w, opposite))
     return after < before
 
 
 @inlined
-def _worst_shape(X, x, y, z, v, w, opposite):
-    nx, ny, nz = face_vector((x, y, z), point(X, v), point(X, w))
+def _shape(X, p, v, w, opposite):
+    """Mean ratio of a triangle from a point and an edge v-w of squared length ``opposite``."""
+    x, y, z = p
+    nx, ny, nz = face_vector(p, point(X, v), point(X, w))
     lv = (X[v, 0] - x) ** 2 + (X[v, 1] - y) ** 2 + (X[v, 2] - z) ** 2
     lw = (X[w, 0] - x) ** 2 + (X[w, 1] - y) ** 2 + (X[w, 2] - z) ** 2
     return mean_ratio(lv, lw, opposite, sqrt(nx * nx + ny * ny + nz * nz))

@@ -3,9 +3,9 @@
 ``p += (I - n n^T) (g - p)`` with ``g = sum A_j p_j / sum A_j`` and A the mixed Voronoi area [Botsch and
 Kobbelt 2004, section 4], over the square of the target length where that varies [Dunyach et al. 2013,
 section 3]. All vertices move at once (Jacobi). Sums run over faces, not over rings: faces are read in
-order without dependent loads, and every normal and area is made once instead of three times. A block
-adds up the faces inside its vertex range; the faces across borders come after, on one thread, so each
-vertex sums in the same order on any number of threads.
+order without dependent loads, and every normal and area is computed once instead of three times. A block
+adds up the faces inside its vertex range; the faces across borders follow in later stages, so each vertex
+sums in the same order on any number of threads.
 """
 
 from __future__ import annotations
@@ -17,7 +17,16 @@ import numpy as np
 from ..core.compiler import add_four, add_row, inlined, threaded
 from ..core.geometry import SHARP, area_vector, mixed_voronoi_areas, tangent_basis
 from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, Mesh
-from ..mesh.blocks import list_range, per_block, per_stage_block, stages, vertex_range
+from ..mesh.blocks import (
+    make_candidates,
+    owns_all,
+    per_block,
+    per_stage_block,
+    slots,
+    stages,
+    vertex_range,
+)
+from ..mesh.walk import corners_of
 
 __all__ = ["relax_vertices"]
 
@@ -30,71 +39,59 @@ _STIFF_SUMS = 16
 def relax_vertices(mesh: Mesh, blocks: Blocks, stiffness: float, parallel: bool) -> None:
     """Move every inner vertex once in its tangent plane.
 
-    ``stiffness`` is the hold of curved ridges on their vertices; 0 for none.
+    ``stiffness`` tells how strongly curved ridges hold their vertices; 0 for not at all.
     """
-    weighted = np.empty((mesh.vertex_halfedge.size, 4))  # positions times weights, and weights
-    n_sums = _STIFF_SUMS if stiffness > 0.0 else _PLAIN_SUMS
-    sums = np.empty((mesh.vertex_halfedge.size, n_sums))
-    across = np.empty(mesh.origin.size // 3, np.int32)
-    count = np.zeros(len(blocks.face) - 1, np.int64)
-    _sum_areas(parallel, mesh, blocks, weighted, across, count)
+    n = mesh.vertex_halfedge.size
+    weighted = np.empty((n, 4))  # positions times weights, and weights
+    sums = np.empty((n, _STIFF_SUMS if stiffness > 0.0 else _PLAIN_SUMS))
+    across = make_candidates(blocks.face)
+    _sum_areas(parallel, mesh, blocks, weighted, across)
     for stage in stages(blocks)[1:]:
-        _sum_areas_across(parallel, mesh, blocks, stage, weighted, across, count)
+        _sum_areas_across(parallel, mesh, blocks, stage, weighted, across)
     _weight(parallel, mesh, blocks, weighted)
     _sum_rings(parallel, mesh, blocks, stiffness, weighted, sums)
     for stage in stages(blocks)[1:]:
-        _sum_rings_across(parallel, mesh, blocks, stage, stiffness, weighted, across, count, sums)
-    _move(parallel, mesh, blocks, stiffness, sums, mesh.X)
+        _sum_rings_across(parallel, mesh, blocks, stage, stiffness, weighted, across, sums)
+    _move(parallel, mesh, blocks, stiffness, sums)
 
 
 @threaded(per_block)
-def _sum_areas(span, mesh, blocks, weighted, across, count):
-    """Mixed Voronoi areas from the faces inside a block; lists the faces across borders."""
+def _sum_areas(span, mesh, blocks, weighted, across):
+    """Sum mixed Voronoi areas over the faces inside a block; lists the faces across borders."""
     for k in range(span[0], span[1]):
-        low = blocks.vertex[k]
-        high = blocks.vertex[k + 1]
+        owned = low, high = blocks.vertex[k], blocks.vertex[k + 1]
         for v in range(low, high):
             weighted[v, 3] = 0.0
-        end = blocks.face[k]
+        end = across.starts[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            a = mesh.origin[3 * f]
-            b = mesh.origin[3 * f + 1]
-            c = mesh.origin[3 * f + 2]
+            a, b, c = corners_of(mesh.origin, f)
             if a == DEAD:
                 continue
-            if min(a, b, c) < low or max(a, b, c) >= high:
-                across[end] = f
+            if owns_all(owned, a, b, c):
+                _add_areas(mesh.X, a, b, c, weighted)
+            else:
+                across.items[end] = f
                 end += 1
-                continue
-            _add_areas(mesh.X, a, b, c, weighted)
-        count[k] = end - blocks.face[k]
+        across.counts[k] = end - across.starts[k]
 
 
 @threaded(per_stage_block)
-def _sum_areas_across(span, mesh, blocks, stage, weighted, across, count):
-    """Add the faces across borders; those that are done are marked by a negative sign."""
+def _sum_areas_across(span, mesh, blocks, stage, weighted, across):
+    """Add the faces across borders; a complemented number marks a face that is done."""
     for k in range(span[0], span[1]):
-        low, high = vertex_range(blocks, stage, k)
-        first, end = list_range(blocks, stage, k)
-        for j in range(first, end):
-            for i in range(blocks.face[j], blocks.face[j] + count[j]):
-                f = np.int64(across[i])
-                if f >= 0 and _has_corners_in(mesh, f, low, high):
-                    _add_areas(
-                        mesh.X, mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2],
-                        weighted,
-                    )  # fmt: skip
-                    across[i] = ~f
-
-
-@inlined
-def _has_corners_in(mesh, f, low, high):
-    a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
-    return min(a, b, c) >= low and max(a, b, c) < high
+        owned = vertex_range(blocks, stage, k)
+        for i in slots(across, blocks, stage, k):
+            f = across.items[i]
+            if f >= 0:
+                a, b, c = corners_of(mesh.origin, f)
+                if owns_all(owned, a, b, c):
+                    _add_areas(mesh.X, a, b, c, weighted)
+                    across.items[i] = ~f
 
 
 @inlined
 def _add_areas(X, a, b, c, weighted):
+    """Add the mixed Voronoi areas of a face to its corners."""
     ux, uy, uz = X[c, 0] - X[b, 0], X[c, 1] - X[b, 1], X[c, 2] - X[b, 2]
     vx, vy, vz = X[a, 0] - X[c, 0], X[a, 1] - X[c, 1], X[a, 2] - X[c, 2]
     wx, wy, wz = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
@@ -112,12 +109,12 @@ def _add_areas(X, a, b, c, weighted):
 
 @threaded(per_block)
 def _weight(span, mesh, blocks, weighted):
-    """Divide areas by the squared target length, and multiply positions by that."""
+    """Divide areas by the squared target length, and multiply positions by the quotient."""
     X = mesh.X
     for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             weight = weighted[v, 3] / (X[v, 3] * X[v, 3])
-            # Half of the cell of a boundary vertex is missing: counted so, it would let its neighbours
+            # Half of the cell of a boundary vertex is missing. Without the factor its neighbours would
             # drift inwards until the edges between are split, and collapsed, for ever.
             if mesh.kind[v] >= CURVE and mesh.twin[max(0, mesh.vertex_halfedge[v])] == NONE:
                 weight *= 2.0
@@ -129,38 +126,33 @@ def _weight(span, mesh, blocks, weighted):
 
 @threaded(per_block)
 def _sum_rings(span, mesh, blocks, stiffness, weighted, sums):
+    """Sum weighted positions and normals over the faces inside a block."""
     for k in range(span[0], span[1]):
-        low = blocks.vertex[k]
-        high = blocks.vertex[k + 1]
+        owned = low, high = blocks.vertex[k], blocks.vertex[k + 1]
         sums[low:high] = 0.0
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            a = mesh.origin[3 * f]
-            b = mesh.origin[3 * f + 1]
-            c = mesh.origin[3 * f + 2]
-            if min(a, b, c) >= low and max(a, b, c) < high:
+            a, b, c = corners_of(mesh.origin, f)
+            if owns_all(owned, a, b, c):
                 _add_face(mesh.X, weighted, a, b, c, stiffness, sums)
 
 
 @threaded(per_stage_block)
-def _sum_rings_across(span, mesh, blocks, stage, stiffness, weighted, across, count, sums):
+def _sum_rings_across(span, mesh, blocks, stage, stiffness, weighted, across, sums):
     """Add the faces across borders, in the order of `_sum_areas_across`, and take their marks off."""
     for k in range(span[0], span[1]):
-        low, high = vertex_range(blocks, stage, k)
-        first, end = list_range(blocks, stage, k)
-        for j in range(first, end):
-            for i in range(blocks.face[j], blocks.face[j] + count[j]):
-                f = ~np.int64(across[i])
-                if f >= 0 and _has_corners_in(mesh, f, low, high):
-                    _add_face(
-                        mesh.X, weighted, mesh.origin[3 * f], mesh.origin[3 * f + 1],
-                        mesh.origin[3 * f + 2], stiffness, sums,
-                    )  # fmt: skip
-                    across[i] = f
+        owned = vertex_range(blocks, stage, k)
+        for i in slots(across, blocks, stage, k):
+            f = ~across.items[i]
+            if f >= 0:
+                a, b, c = corners_of(mesh.origin, f)
+                if owns_all(owned, a, b, c):
+                    _add_face(mesh.X, weighted, a, b, c, stiffness, sums)
+                    across.items[i] = f
 
 
 @inlined
 def _add_face(X, weighted, a, b, c, stiffness, sums):
-    """Add a face to the sums of its corners; its half-edges bring each the neighbour they end at."""
+    """Add a face to the sums of its corners; each half-edge adds the vertex that it ends at."""
     nx, ny, nz = area_vector(X, a, b, c)
     add_row(sums, a, weighted, b)
     add_row(sums, b, weighted, c)
@@ -182,7 +174,9 @@ def _add_face(X, weighted, a, b, c, stiffness, sums):
 
 
 @threaded(per_block)
-def _move(span, mesh, blocks, stiffness, sums, X):
+def _move(span, mesh, blocks, stiffness, sums):
+    """Move the inner vertices."""
+    X = mesh.X  # changed in place: a vertex reads the sums and its own row
     for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] != DEAD and mesh.kind[v] == INNER:
@@ -194,7 +188,10 @@ def _move(span, mesh, blocks, stiffness, sums, X):
 
 @inlined
 def _relaxation_step(X, v, sums, stiffness):
-    # A vertex on a sharp edge has no tangent plane: it stays, or the rim of a sheet would creep inwards.
+    """Compute the step of a vertex in its tangent plane.
+
+    A vertex on a sharp edge has no tangent plane. It stays, or the rim of a sheet would creep inwards.
+    """
     nx, ny, nz = sums[v, 4], sums[v, 5], sums[v, 6]
     norm = sqrt(nx * nx + ny * ny + nz * nz)
     if not (sums[v, 3] > 0.0 and norm > SHARP * sums[v, 7]):
@@ -212,16 +209,18 @@ def _relaxation_step(X, v, sums, stiffness):
     dy -= along * ny
     dz -= along * nz
     if stiffness > 0.0:
-        dx, dy, dz = _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness)
+        return _stiffened(sums, v, (nx, ny, nz), (dx, dy, dz), stiffness)
     return dx, dy, dz
 
 
 @inlined
-def _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness):
-    """Damp the step where normals vary: ``(I + s Q^2)^-1 d``, Q the normal tensor in the tangent plane.
+def _stiffened(sums, v, normal, step, stiffness):
+    """Damp a step where normals vary: ``(I + s Q^2)^-1 d``, Q the normal tensor in the tangent plane.
 
     Across a curved ridge Q is large and the vertex stays on it; along the ridge it still slides.
     """
+    nx, ny, nz = normal
+    dx, dy, dz = step
     scale = 1.0 / sums[v, 7]
     xx, xy, xz = sums[v, 8] * scale, sums[v, 9] * scale, sums[v, 10] * scale
     yy, yz = sums[v, 11] * scale, sums[v, 12] * scale
@@ -231,7 +230,7 @@ def _stiffened(sums, v, nx, ny, nz, dx, dy, dz, stiffness):
         nx * (xx * nx + 2.0 * (xy * ny + xz * nz)) + ny * (yy * ny + 2.0 * yz * nz) + nz * zz * nz
     )
     if xx + yy + zz - along < 1e-3:
-        return dx, dy, dz
+        return step
     sx, sy, sz, tx, ty, tz = tangent_basis(nx, ny, nz)
     qs_x, qs_y, qs_z = (
         xx * sx + xy * sy + xz * sz,

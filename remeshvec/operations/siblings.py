@@ -1,7 +1,7 @@
-"""Collapse siblings: the edges that lie in the same place on several sheets of a surface.
+"""Collapse siblings: the copies of one non-manifold edge on its several sheets.
 
-All of a group collapse, or none does. They are few, and owned by no block: one thread takes them in
-order, with the guards of every other collapse.
+All edges of a group collapse, or none does. They are few, and no block owns them: one thread takes them
+in order, with the guards of every other collapse.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def collapse_siblings(
     Parameters
     ----------
     members : (k,) int32
-        Half-edges, those of a group together.
+        Half-edges; those of a group stand together.
     group : (g + 1,) int32
         Where the groups start.
     """
@@ -35,43 +35,43 @@ def collapse_siblings(
 
 @kernel
 def _collapse_siblings(mesh, members, group, limits, rings):
+    """Ask for every group all guards of all its edges, then collapse it."""
     touched = np.full(mesh.vertex_halfedge.size, NONE, np.int32)
-    end = np.int64(mesh.vertex_halfedge.size)
+    everywhere = 0, mesh.vertex_halfedge.size
     done = 0
     for g in range(group.size - 1):
         agreed = True
         for i in range(group[g], group[g + 1]):
-            h = np.int64(members[i])
+            h = members[i]
             if mesh.origin[h] == DEAD:
                 agreed = False
                 break
-            outcome, _, _, _, _, n_a, n_b = examine_edge(mesh, h, 0, end, limits, rings)
+            outcome, _ = examine_edge(mesh, h, everywhere, limits, rings)
             # Where the rings of two siblings meet, on one sheet that meets itself, all stay.
-            if outcome != COLLAPSED or _claim_rings(
-                mesh, rings.face, n_a, n_b, touched, group[g], i
-            ):
+            if outcome != COLLAPSED or _claim_rings(mesh, rings, touched, group[g], i):
                 agreed = False
                 break
         if not agreed:
             continue
         done += 1
         for i in range(group[g], group[g + 1]):
-            h = np.int64(members[i])
-            _, x, y, z, s, n_a, n_b = examine_edge(mesh, h, 0, end, limits, rings)
-            remove_edge(mesh, h, x, y, z, s, rings.face, n_a, n_b)
+            h = members[i]
+            _, place = examine_edge(mesh, h, everywhere, limits, rings)
+            remove_edge(mesh, h, place, rings)
     return done
 
 
 @inlined
-def _claim_rings(mesh, faces, n_a, n_b, touched, first, mine):
+def _claim_rings(mesh, rings, touched, first, mine):
     """Mark the vertices around an edge; tells whether a sibling has marked one of them.
 
-    Fixed ones do not count: where a seam ends inside a sheet, the rings of both sides hold its tip.
+    Fixed vertices do not count: where a non-manifold edge ends inside a sheet, the rings of both sides
+    hold that end.
     """
     met = False
     for side in range(2):
-        for i in range(n_a if side == 0 else n_b):
-            h = faces[side, i]
+        for i in range(rings.size[side, 0]):
+            h = rings.face[side, i]
             for g in (h, next_halfedge(h), previous_halfedge(h)):
                 v = mesh.origin[g]
                 if mesh.kind[v] != FIXED:

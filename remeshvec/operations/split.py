@@ -1,20 +1,25 @@
 """Split long edges: all long edges of a face at once, by template.
 
-One round marks the edges that are too long, counts, and writes the refined mesh into new arrays, so
-that compaction and vertex order come for free: children take the place of their face, vertices follow
-the half-edge that owns them (``vertex_halfedge``), midpoints follow theirs. Rounds go on until no edge
-is too long, 3 or 4 in the first sweep, 1 later; each halves the longest edge. Splitting in place in
-half-edge order never ends: a long neighbour moves to a new slot again and again.
+One round marks the edges that are too long, counts, and writes the refined mesh into new arrays.
+Compaction and vertex order need no work of their own: children take the place of their face, vertices
+follow the half-edge that owns them (``vertex_halfedge``), midpoints follow theirs. Rounds go on until no
+edge is too long, 3 or 4 in the first sweep, 1 later; each halves the longest edge. Splitting in place in
+half-edge order would never end: a long neighbour moves to a new slot again and again.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel, threaded
 from ..core.geometry import distance_squared
 from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, IndexArray, Mesh
-from ..mesh.blocks import per_block
+from ..mesh.blocks import make_candidates, owns_all, per_block
+from ..mesh.edge_curves import is_feature
+from ..mesh.walk import corners_of, end_of
 from .bisect import birth_between, bisect_edges
 from .classify import REMOVED, EdgeFlags, classify_edges
 from .templates import CORNER, COUNT, GAIN, PART, TWIN
@@ -27,8 +32,33 @@ MAX_ROUNDS = 64
 # Where fewer edges than this share of the faces are long, they are split in place.
 _FEW = 1.0 / 16.0
 
-# Faces and vertices that a new mesh has room for, as a share of its faces: two for every split.
+# Spare faces and vertices of a new mesh, as a share of its faces: two for every split.
 SPARE = 2.0 * _FEW
+
+
+class Numbering(NamedTuple):
+    """Where the elements of a mesh go when it is written anew.
+
+    Parameters
+    ----------
+    mask : (m,) uint8
+        Template of every face in bits 0 to 3; bits 4 to 6 tell which of its corners follow it, being
+        owned by its half-edges; ``REMOVED`` for a removed face.
+    first_child : (m,) int32
+        New number of the face, or of the first of its children.
+    vertex : (n,) int32
+        New number of the vertex.
+    midpoint : (3 m,) int32
+        New vertex in the middle of a split edge, at the later half-edge of the edge.
+    end : (b + 1, 2) int64
+        First new face and first new vertex of every block.
+    """
+
+    mask: NDArray[np.uint8]
+    first_child: IndexArray
+    vertex: IndexArray
+    midpoint: IndexArray
+    end: NDArray[np.int64]
 
 
 def split_long_edges(
@@ -41,14 +71,14 @@ def split_long_edges(
 ) -> tuple[Mesh, int]:
     """Split every edge longer than ``factor`` times its target length.
 
-    Once, by writing the mesh anew; or, where they are few and there is room, in place until none is left.
-    Siblings (see `polyline.find_siblings`) are split together. ``flags`` are what `classify_edges`
-    says of this mesh and factor, where that is known; of a mesh that is split in place they stay true.
+    Splits once, by writing the mesh anew; or, if the edges are few and there is space, in place until
+    none is left. Siblings (see `polyline.find_siblings`) are split together. ``flags`` is the result of
+    `classify_edges` for this mesh and factor, if it is known; splits in place keep it true.
 
     Returns
     -------
     mesh : Mesh
-        The refined mesh in new arrays; the same one where no edge is too long any more.
+        The refined mesh in new arrays; the same mesh once no edge is too long any more.
     n_split : int
         Edges split.
     """
@@ -57,7 +87,7 @@ def split_long_edges(
     n_split = 0
     n_left = flags.n_long
     if siblings is not None:
-        _ask_siblings(flags.mask, *siblings)
+        _request_siblings(flags.mask, *siblings)
     elif 2 * n_left <= flags.n_gone and n_left <= _FEW * len(flags.mask):
         n_split, n_left = bisect_edges(mesh, blocks, flags, parallel)
     if not n_left:
@@ -68,14 +98,27 @@ def split_long_edges(
 
 def split_edges(mesh: Mesh, blocks: Blocks, edges: IndexArray, parallel: bool) -> Mesh:
     """Split the given half-edges, whatever their length."""
-    requested = np.zeros(mesh.origin.size // 3, np.uint8)
-    requested[mesh.origin[::3] == DEAD] = REMOVED
+    requested = _request_nothing(mesh)
     np.bitwise_or.at(requested, edges // 3, (1 << (edges % 3)).astype(np.uint8))
     return _refine(mesh, blocks, requested, parallel)[0]
 
 
-def _ask_siblings(requested: np.ndarray, members: IndexArray, group: IndexArray) -> None:
-    """Let all faces around an edge with siblings ask for its split if one does."""
+def compact(mesh: Mesh, blocks: Blocks, parallel: bool, spare: float = 0.0) -> Mesh:
+    """Drop removed faces and vertices, keeping the order: a split of no edge.
+
+    ``spare`` faces are left free for splits in place, as a share of the faces.
+    """
+    return _refine(mesh, blocks, _request_nothing(mesh), parallel, spare, False)[0]
+
+
+def _request_nothing(mesh: Mesh) -> NDArray[np.uint8]:
+    requested = np.zeros(mesh.origin.size // 3, np.uint8)
+    requested[mesh.origin[::3] == DEAD] = REMOVED
+    return requested
+
+
+def _request_siblings(requested: NDArray[np.uint8], members: IndexArray, group: IndexArray) -> None:
+    """Let all faces around an edge with siblings request its split if one face does."""
     if len(members):
         bit = (1 << (members % 3)).astype(np.uint8)
         wanted = np.bitwise_or.reduceat((requested[members // 3] & bit) != 0, group[:-1])
@@ -83,42 +126,51 @@ def _ask_siblings(requested: np.ndarray, members: IndexArray, group: IndexArray)
         np.bitwise_or.at(requested, members[wanted] // 3, bit[wanted])
 
 
-def compact(mesh: Mesh, blocks: Blocks, parallel: bool, room: float = 0.0) -> Mesh:
-    """Drop removed faces and vertices, keeping the order: a split of no edge.
-
-    ``room`` is left free for splits in place, as a share of the faces.
-    """
-    requested = np.zeros(mesh.origin.size // 3, np.uint8)
-    requested[mesh.origin[::3] == DEAD] = REMOVED
-    return _refine(mesh, blocks, requested, parallel, room, False)[0]
-
-
 def _refine(
     mesh: Mesh,
     blocks: Blocks,
-    requested: np.ndarray,
+    requested: NDArray[np.uint8],
     parallel: bool,
-    room: float = 0.0,
+    spare: float = 0.0,
     splits: bool = True,
 ) -> tuple[Mesh, int]:
-    """Write the mesh anew with the edges split that any face asks for; returns their number too.
+    """Write the mesh anew with the requested edges split; returns their number too.
 
-    ``room`` is left free at the end of every block, as a share of its faces. ``splits`` says whether
-    any edge is asked for.
+    ``spare`` faces are left free at the end of every block, as a share of its faces. ``splits`` tells
+    whether any edge is requested.
     """
     mask = np.empty_like(requested)
     sizes = np.zeros((len(blocks.face) - 1, 3), np.int64)
     _mark_edges(parallel, mesh, blocks, requested, splits, mask, sizes)
-    ends = np.zeros((len(sizes) + 1, 2), np.int64)
-    free = (room * sizes[:, 0]).astype(np.int64)
-    np.cumsum(sizes[:, 0] + free, out=ends[1:, 0])
-    np.cumsum(sizes[:, 1] + sizes[:, 2] + free // 2, out=ends[1:, 1])
-    n_faces, n_vertices = ends[-1].tolist()
+    numbers = Numbering(
+        mask,
+        np.empty(mask.size, np.int32),
+        np.empty(mesh.vertex_halfedge.size, np.int32),
+        np.empty(mesh.origin.size, np.int32),
+        _ends_of_blocks(sizes, spare),
+    )
+    _number_new(parallel, mesh, blocks, numbers)
+    refined = _empty_mesh(*numbers.end[-1].tolist())
+    _write_refined(parallel, mesh, blocks, numbers, refined)
     n_split = int(sizes[:, 2].sum())
-    first_child = np.empty(mask.size, np.int32)
-    new_vertex = np.empty(mesh.vertex_halfedge.size, np.int32)
-    middle = np.empty(mesh.origin.size, np.int32)
-    refined = Mesh(
+    if n_split:
+        across = make_candidates(blocks.face)
+        _update_valences(parallel, mesh, blocks, numbers, refined.valence_excess, across)
+        _update_valences_across(mesh, numbers, refined.valence_excess, across)
+    return refined, n_split
+
+
+def _ends_of_blocks(sizes: NDArray[np.int64], spare: float) -> NDArray[np.int64]:
+    """Lay the blocks of the new mesh end to end, each with its spare faces and half as many vertices."""
+    end = np.zeros((len(sizes) + 1, 2), np.int64)
+    free = (spare * sizes[:, 0]).astype(np.int64)
+    np.cumsum(sizes[:, 0] + free, out=end[1:, 0])
+    np.cumsum(sizes[:, 1] + sizes[:, 2] + free // 2, out=end[1:, 1])
+    return end
+
+
+def _empty_mesh(n_faces: int, n_vertices: int) -> Mesh:
+    return Mesh(
         np.empty(3 * n_faces, np.int32),
         np.empty(3 * n_faces, np.int32),
         np.empty(3 * n_faces, np.int32),
@@ -129,50 +181,39 @@ def _refine(
         np.empty(n_vertices, np.uint8),
         np.empty(n_vertices, np.int32),
     )
-    _number_new(parallel, mesh, blocks, mask, ends, first_child, new_vertex, middle)
-    numbers = (mask, first_child, new_vertex, middle)
-    _write_refined(parallel, mesh, blocks, ends, *numbers, *refined)
-    if n_split:
-        across, count = np.empty(mask.size, np.int32), np.zeros(len(sizes), np.int64)
-        changes = (mask, new_vertex, middle, refined.valence_excess, across, count)
-        _update_valences(parallel, mesh, blocks, *changes)
-        _update_valences_across(mesh, blocks, *changes)
-    return refined, n_split
 
 
 @threaded(per_block)
 def _mark_edges(span, mesh, blocks, requested, splits, mask, sizes):
-    """Template of every face: mask of the edges that it or a neighbour wants split, and the diagonal.
+    """Choose the template of every face, see `Numbering`: its edges that it or a neighbour wants split.
 
-    Bits 4 to 6 say which of the corners' vertices follow this face. Sizes per block: children, vertices
-    owned, edges split.
+    ``sizes`` gets, per block, children, vertices owned, and edges split.
     """
     for k in range(span[0], span[1]):
         children = 0
         owned = 0
         split = 0
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            m = np.int64(requested[f])
-            if m == REMOVED:
+            if requested[f] == REMOVED:
                 mask[f] = REMOVED
                 continue
-            m &= 7
+            m = 7 & requested[f]
             if splits:
                 for i in range(3):
                     h = 3 * f + i
-                    t = np.int64(mesh.twin[h])
+                    t = mesh.twin[h]
                     if t != NONE:
                         g = t // 3
-                        m |= ((np.int64(requested[g]) >> (t - 3 * g)) & 1) << i
+                        m |= ((requested[g] >> (t - 3 * g)) & 1) << i
                     split += ((m >> i) & 1) & (t < h)
                 if m == 3 or m == 5 or m == 6:
                     m = _choose_diagonal(mesh, f, m)
             children += COUNT[m]
             for i in range(3):
                 h = 3 * f + i
-                is_owner = np.int64(mesh.vertex_halfedge[mesh.origin[h]] == h)
+                is_owner = mesh.vertex_halfedge[mesh.origin[h]] == h
                 owned += is_owner
-                m |= is_owner << (4 + i)
+                m |= is_owner * (16 << i)
             mask[f] = m
         sizes[k, 0] = children
         sizes[k, 1] = owned
@@ -186,7 +227,7 @@ def _choose_diagonal(mesh, f, m):
     The shorter one ends at the midpoint of the longer of the two split edges: of two medians, the
     one to the longer edge is shorter.
     """
-    a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
+    a, b, c = corners_of(mesh.origin, f)
     l0 = distance_squared(mesh.X, a, b)
     l1 = distance_squared(mesh.X, b, c)
     l2 = distance_squared(mesh.X, c, a)
@@ -196,162 +237,187 @@ def _choose_diagonal(mesh, f, m):
 
 
 @threaded(per_block)
-def _number_new(span, mesh, blocks, mask, ends, first_child, new_vertex, middle):
+def _number_new(span, mesh, blocks, numbers):
     """Give children, vertices and midpoints the order of the half-edges that own them."""
     for k in range(span[0], span[1]):
-        child = ends[k, 0]
-        vertex = ends[k, 1]
+        child = numbers.end[k, 0]
+        vertex = numbers.end[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            m = np.int64(mask[f])
+            m = numbers.mask[f]
             if m == REMOVED:
                 continue
-            first_child[f] = child
+            numbers.first_child[f] = child
             child += COUNT[m & 15]
             if m == 0:
                 continue
             for i in range(3):
                 h = 3 * f + i
                 if (m >> (4 + i)) & 1:
-                    new_vertex[mesh.origin[h]] = vertex
+                    numbers.vertex[mesh.origin[h]] = vertex
                     vertex += 1
                 # The later half-edge of a pair owns the midpoint; one without twin is the later.
                 if (m >> i) & 1 and mesh.twin[h] < h:
-                    middle[h] = vertex
+                    numbers.midpoint[h] = vertex
                     vertex += 1
 
 
 @threaded(per_block)
-def _write_refined(
-    span, mesh, blocks, ends, mask, first_child, new_vertex, middle,
-    origin, twin, curve, source, halfedge, excess, X, kind, birth,
-):  # fmt: skip
-    """Write the children of every face and the vertices that follow it; what is left free is dead."""
+def _write_refined(span, mesh, blocks, numbers, new):
+    """Write the children of every face and the vertices that follow it, into arrays of their own."""
     for k in range(span[0], span[1]):
         ids = np.empty(6, np.int64)
-        face = ends[k, 0]
-        vertex = ends[k, 1]
+        face = numbers.end[k, 0]
+        vertex = numbers.end[k, 1]
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            m = np.int64(mask[f])
-            if m == REMOVED:
+            flags = numbers.mask[f]
+            if flags == REMOVED:
                 continue
-            owned = m >> 4
-            m &= 15
-            base = 3 * np.int64(first_child[f])
-            face = first_child[f] + COUNT[m]
-            if m == 0:  # most faces: a copy
-                for i in range(3):
-                    origin[base + i] = new_vertex[mesh.origin[3 * f + i]]
-                    twin[base + i] = _part_of(mesh.twin[3 * f + i], 0, mask, first_child)
-                    curve[base + i] = mesh.curve[3 * f + i]
-                source[base // 3] = mesh.source[f]
+            m = flags & 15
+            if m == 0:  # most faces
+                _copy_face(mesh, f, numbers, new)
             else:
-                for i in range(3):
-                    h = 3 * f + i
-                    ids[i] = new_vertex[mesh.origin[h]]
-                    if (m >> i) & 1:
-                        ids[3 + i] = middle[max(h, np.int64(mesh.twin[h]))]
-                _write_children(
-                    mesh, f, m, base, ids, mask, first_child, origin, twin, curve, source
-                )
-            if owned == 0 and m == 0:
-                continue
-            for i in range(3):
-                h = 3 * f + i
-                v = mesh.origin[h]
-                if (owned >> i) & 1:
-                    new = new_vertex[v]
-                    vertex = np.int64(new) + 1
-                    halfedge[new] = base + (i if m == 0 else PART[m, 2 * i])
-                    excess[new] = mesh.valence_excess[v]
-                    kind[new] = mesh.kind[v]
-                    birth[new] = mesh.birth[v]
-                    for j in range(4):
-                        X[new, j] = mesh.X[v, j]
-                if (m >> i) & 1 and mesh.twin[h] < h:
-                    new = middle[h]
-                    vertex = np.int64(new) + 1
-                    w = mesh.origin[3 * f + (i + 1) % 3]
-                    halfedge[new] = base + PART[m, 2 * i + 1]
-                    # No face yet: `_update_valences` adds them. A boundary has an edge more.
-                    excess[new] = -6 if mesh.twin[h] != NONE else -3
-                    kind[new] = INNER if mesh.curve[h] == NONE else CURVE
-                    birth[new] = birth_between(mesh, h, v, w)
-                    for j in range(4):
-                        X[new, j] = 0.5 * (mesh.X[v, j] + mesh.X[w, j])
-        origin[3 * face : 3 * ends[k + 1, 0]] = DEAD
-        for v in range(vertex, ends[k + 1, 1]):
-            halfedge[v] = DEAD
-            kind[v] = INNER
-            birth[v] = 0
-            X[v] = 1.0
+                _write_children(mesh, f, m, ids, numbers, new)
+            face = numbers.first_child[f] + COUNT[m]
+            if flags != 0:
+                vertex = _write_vertices(mesh, f, flags, vertex, numbers, new)
+        _mark_spare(new, (face, numbers.end[k + 1, 0]), (vertex, numbers.end[k + 1, 1]))
 
 
 @inlined
-def _write_children(mesh, f, m, base, ids, mask, first_child, origin, twin, curve, source):
+def _copy_face(mesh, f, numbers, new):
+    """Write a face without split edges."""
+    base = 3 * numbers.first_child[f]
+    for i in range(3):
+        h = 3 * f + i
+        new.origin[base + i] = numbers.vertex[mesh.origin[h]]
+        new.twin[base + i] = _part_of(mesh.twin[h], 0, numbers)
+        new.curve[base + i] = mesh.curve[h]
+    new.source[base // 3] = mesh.source[f]
+
+
+@inlined
+def _write_children(mesh, f, m, ids, numbers, new):
     """Write children and their twins: inside a template from its table, across by parts of edges."""
+    first = numbers.first_child[f]
+    base = 3 * first
+    for i in range(3):
+        h = 3 * f + i
+        ids[i] = numbers.vertex[mesh.origin[h]]
+        if (m >> i) & 1:
+            ids[3 + i] = numbers.midpoint[max(h, mesh.twin[h])]
     for j in range(COUNT[m]):
-        source[base // 3 + j] = mesh.source[f]
+        new.source[first + j] = mesh.source[f]
     for j in range(3 * COUNT[m]):
-        curve[base + j] = NONE
-        origin[base + j] = ids[CORNER[m, j]]
-        twin[base + j] = base + TWIN[m, j] if TWIN[m, j] >= 0 else NONE
+        new.curve[base + j] = NONE
+        new.origin[base + j] = ids[CORNER[m, j]]
+        new.twin[base + j] = base + TWIN[m, j] if TWIN[m, j] >= 0 else NONE
     for i in range(3):
         # Halves meet crosswise: the first of this side lies on the second of the other.
         half = (m >> i) & 1
         t = mesh.twin[3 * f + i]
-        twin[base + PART[m, 2 * i]] = _part_of(t, half, mask, first_child)
-        curve[base + PART[m, 2 * i]] = mesh.curve[3 * f + i]
+        new.twin[base + PART[m, 2 * i]] = _part_of(t, half, numbers)
+        new.curve[base + PART[m, 2 * i]] = mesh.curve[3 * f + i]
         if half:
-            twin[base + PART[m, 2 * i + 1]] = _part_of(t, 0, mask, first_child)
-            curve[base + PART[m, 2 * i + 1]] = mesh.curve[3 * f + i]
+            new.twin[base + PART[m, 2 * i + 1]] = _part_of(t, 0, numbers)
+            new.curve[base + PART[m, 2 * i + 1]] = mesh.curve[3 * f + i]
 
 
 @inlined
-def _part_of(h, half, mask, first_child):
-    """Place in the refined mesh of a half-edge, or of its second half."""
+def _part_of(h, half, numbers):
+    """Return the place in the new mesh of a half-edge, or of its second half."""
     if h == NONE:
-        return np.int64(NONE)
-    f = np.int64(h) // 3
-    i = np.int64(h) - 3 * f
-    m = np.int64(mask[f]) & 15
-    return 3 * np.int64(first_child[f]) + (i if m == 0 else PART[m, 2 * i + half])
+        return NONE
+    f = h // 3
+    i = h - 3 * f
+    m = numbers.mask[f] & 15
+    return 3 * numbers.first_child[f] + (i if m == 0 else PART[m, 2 * i + half])
+
+
+@inlined
+def _write_vertices(mesh, f, flags, vertex, numbers, new):
+    """Write the vertices that follow a face; returns the first new vertex not yet written."""
+    m = flags & 15
+    base = 3 * numbers.first_child[f]
+    for i in range(3):
+        h = 3 * f + i
+        if (flags >> (4 + i)) & 1:
+            v = mesh.origin[h]
+            u = numbers.vertex[v]
+            vertex = u + 1
+            new.vertex_halfedge[u] = base + (i if m == 0 else PART[m, 2 * i])
+            new.valence_excess[u] = mesh.valence_excess[v]
+            new.kind[u] = mesh.kind[v]
+            new.birth[u] = mesh.birth[v]
+            for j in range(4):
+                new.X[u, j] = mesh.X[v, j]
+        if (m >> i) & 1 and mesh.twin[h] < h:
+            u = numbers.midpoint[h]
+            vertex = u + 1
+            new.vertex_halfedge[u] = base + PART[m, 2 * i + 1]
+            _write_midpoint(mesh, h, u, new)
+    return vertex
+
+
+@inlined
+def _write_midpoint(mesh, h, u, new):
+    """Write vertex ``u`` in the middle of an edge."""
+    v, w = mesh.origin[h], end_of(mesh.origin, h)
+    # No face yet: `_update_valences` adds them. A boundary has an edge more.
+    new.valence_excess[u] = -6 if mesh.twin[h] != NONE else -3
+    new.kind[u] = CURVE if is_feature(mesh.curve[h]) else INNER
+    new.birth[u] = birth_between(mesh, h, v, w)
+    for j in range(4):
+        new.X[u, j] = 0.5 * (mesh.X[v, j] + mesh.X[w, j])
+
+
+@inlined
+def _mark_spare(new, faces, vertices):
+    """Mark the ranges of faces and vertices that a block has spare as dead."""
+    new.origin[3 * faces[0] : 3 * faces[1]] = DEAD
+    for v in range(vertices[0], vertices[1]):
+        new.vertex_halfedge[v] = DEAD
+        new.kind[v] = INNER
+        new.birth[v] = 0
+        new.X[v] = 1.0
 
 
 @threaded(per_block)
-def _update_valences(span, mesh, blocks, mask, new_vertex, middle, excess, across, count):
-    """Add what the children of split faces bring; lists the faces whose vertices are not all the block's.
+def _update_valences(span, mesh, blocks, numbers, excess, across):
+    """Add the edges that the children of split faces bring.
 
-    A midpoint belongs to the block of both ends of its edge.
+    Lists the faces whose vertices do not all belong to the block; a midpoint belongs to the block of
+    both ends of its edge.
     """
     for k in range(span[0], span[1]):
-        low = blocks.vertex[k]
-        high = blocks.vertex[k + 1]
-        end = blocks.face[k]
+        owned = blocks.vertex[k], blocks.vertex[k + 1]
+        end = across.starts[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            m = np.int64(mask[f]) & 15
-            if m == 0 or mask[f] == REMOVED:
+            m = numbers.mask[f] & 15
+            if m == 0 or numbers.mask[f] == REMOVED:
                 continue
-            a, b, c = mesh.origin[3 * f], mesh.origin[3 * f + 1], mesh.origin[3 * f + 2]
-            if min(a, b, c) >= low and max(a, b, c) < high:
-                _add_gains(mesh, f, m, new_vertex, middle, excess)
+            a, b, c = corners_of(mesh.origin, f)
+            if owns_all(owned, a, b, c):
+                _add_gains(mesh, f, m, numbers, excess)
             else:
-                across[end] = f
+                across.items[end] = f
                 end += 1
-        count[k] = end - blocks.face[k]
+        across.counts[k] = end - across.starts[k]
 
 
 @kernel
-def _update_valences_across(mesh, blocks, mask, new_vertex, middle, excess, across, count):
-    for k in range(blocks.face.size - 1):
-        for i in range(blocks.face[k], blocks.face[k] + count[k]):
-            f = np.int64(across[i])
-            _add_gains(mesh, f, np.int64(mask[f]) & 15, new_vertex, middle, excess)
+def _update_valences_across(mesh, numbers, excess, across):
+    """Add the edges of the faces that `_update_valences` has listed, on one thread."""
+    for k in range(across.counts.size):
+        for i in range(across.starts[k], across.starts[k] + across.counts[k]):
+            f = across.items[i]
+            _add_gains(mesh, f, numbers.mask[f] & 15, numbers, excess)
 
 
 @inlined
-def _add_gains(mesh, f, m, new_vertex, middle, excess):
+def _add_gains(mesh, f, m, numbers, excess):
+    """Add the gains of a split face to its corners and midpoints."""
     for i in range(3):
         h = 3 * f + i
-        excess[new_vertex[mesh.origin[h]]] += GAIN[m, i]
+        excess[numbers.vertex[mesh.origin[h]]] += GAIN[m, i]
         if (m >> i) & 1:
-            excess[middle[max(h, np.int64(mesh.twin[h]))]] += GAIN[m, 3 + i]
+            excess[numbers.midpoint[max(h, mesh.twin[h])]] += GAIN[m, 3 + i]

@@ -1,4 +1,4 @@
-"""Templates of split faces: how a face with one, two or three long edges falls into children."""
+"""Templates of split faces: the children of a face with one, two or three long edges."""
 
 from __future__ import annotations
 
@@ -27,9 +27,21 @@ _CHILDREN: dict[int, list[tuple[int, int, int]]] = {
 
 
 def _build_templates() -> tuple[np.ndarray, ...]:
-    """Turn the list of children into tables.
+    """Turn the list of children into tables, one row per mask.
 
-    Counts, corners, twins inside, place of each half edge, faces that each corner gains.
+    Returns
+    -------
+    count : (16,) int64
+        Children.
+    corner : (16, 12) int64
+        Corner or midpoint at which each half-edge of the children starts; -1 for no half-edge.
+    inner : (16, 12) int64
+        Twin of each half-edge inside the template, -1 on its outer edges.
+    part : (16, 6) int64
+        Half-edge on the first and on the second half of each outer edge; an edge that is not split has a
+        first half only.
+    gain : (16, 6) int64
+        Faces that each corner gains and each midpoint has.
     """
     count = np.zeros(16, np.int64)
     corner = np.full((16, 12), -1, np.int64)

@@ -1,7 +1,7 @@
 """Unfold: take back the moves that turned faces beside curves over.
 
 The middle of a ring lies outside where a curve is concave, or where the ring hangs on an edge that must
-not be split. All vertices move at once, so this shows only afterwards. Away from curves nothing is
+not be split. All vertices move at once, so a foldover shows only afterwards. Away from curves nothing is
 taken back: that would keep the folds of the input.
 """
 
@@ -12,7 +12,8 @@ import numpy as np
 from ..core.compiler import threaded
 from ..core.geometry import area_vector, turn_exceeds
 from ..core.vocabulary import CURVE, DEAD, INNER, Blocks, FloatArray, Mesh
-from ..mesh.blocks import per_block
+from ..mesh.blocks import make_candidates, per_block
+from ..mesh.walk import corners_of
 
 __all__ = ["undo_folds"]
 
@@ -21,63 +22,57 @@ _COSINE = 0.5
 
 
 def undo_folds(mesh: Mesh, blocks: Blocks, before: FloatArray, parallel: bool) -> int:
-    """Put inner vertices back of faces at curves that turned too far; returns how many vertices.
+    """Put back the inner vertices of faces at curves that turned too far; returns how many.
 
-    Repeated until there are none: what is put back may fold a neighbour.
+    Repeats until no face is folded or nothing moves: a vertex that is put back may fold a neighbour.
 
     Parameters
     ----------
     mesh : Mesh
     blocks : Blocks
     before : (n, 3) or (n, 4) float64
-        Where the vertices were.
+        Positions before the moves.
     parallel : bool
     """
     total = 0
     marked = np.zeros(mesh.vertex_halfedge.size, np.uint8)
-    faces = np.empty(mesh.origin.size // 3, np.int32)
-    n_faces = np.zeros(len(blocks.face) - 1, np.int64)
-    _list_faces_at_curves(parallel, mesh, blocks, faces, n_faces)
-    if not n_faces.any():
+    faces = make_candidates(blocks.face)
+    _list_faces_at_curves(parallel, mesh, blocks, faces)
+    if not faces.counts.any():
         return 0
     while True:
-        found = np.zeros(len(n_faces), np.int64)
-        _find_folds(parallel, mesh, blocks, before, faces, n_faces, marked, found)
+        found = np.zeros(len(faces.counts), np.int64)
+        _find_folds(parallel, mesh, blocks, before, faces, marked, found)
         if not found.any():
             return total
-        count = np.zeros(len(n_faces), np.int64)
-        _put_back(parallel, mesh, blocks, before, marked, mesh.X, count)
+        count = np.zeros(len(faces.counts), np.int64)
+        _put_back(parallel, mesh, blocks, before, marked, count)
         if not count.any():
             return total
         total += int(count.sum())
 
 
 @threaded(per_block)
-def _list_faces_at_curves(span, mesh, blocks, faces, n_faces):
+def _list_faces_at_curves(span, mesh, blocks, faces):
+    """List the faces with a vertex on a curve."""
     for k in range(span[0], span[1]):
-        end = blocks.face[k]
+        end = faces.starts[k]
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            a = mesh.origin[3 * f]
+            a, b, c = corners_of(mesh.origin, f)
             if a != DEAD:
-                b = mesh.origin[3 * f + 1]
-                c = mesh.origin[3 * f + 2]
-                faces[end] = f
+                faces.items[end] = f
                 end += max(mesh.kind[a], mesh.kind[b], mesh.kind[c]) >= CURVE
-        n_faces[k] = end - blocks.face[k]
+        faces.counts[k] = end - faces.starts[k]
 
 
 @threaded(per_block)
-def _find_folds(span, mesh, blocks, before, faces, n_faces, marked, found):
+def _find_folds(span, mesh, blocks, before, faces, marked, found):
     """Mark the corners of folded faces; blocks may mark the same vertex, with the same value."""
-    X = mesh.X
     for k in range(span[0], span[1]):
-        for i in range(blocks.face[k], blocks.face[k] + n_faces[k]):
-            f = faces[i]
-            a = mesh.origin[3 * f]
-            b = mesh.origin[3 * f + 1]
-            c = mesh.origin[3 * f + 2]
+        for i in range(faces.starts[k], faces.starts[k] + faces.counts[k]):
+            a, b, c = corners_of(mesh.origin, faces.items[i])
             old = ux, uy, uz = area_vector(before, a, b, c)
-            new = area_vector(X, a, b, c)
+            new = area_vector(mesh.X, a, b, c)
             if ux * ux + uy * uy + uz * uz > 0.0 and turn_exceeds(old, new, _COSINE):
                 marked[a] = 1
                 marked[b] = 1
@@ -86,7 +81,9 @@ def _find_folds(span, mesh, blocks, before, faces, n_faces, marked, found):
 
 
 @threaded(per_block)
-def _put_back(span, mesh, blocks, before, marked, X, count):
+def _put_back(span, mesh, blocks, before, marked, count):
+    """Put marked inner vertices back, and take the marks off; counts the vertices that moved."""
+    X = mesh.X
     for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if marked[v] == 0:

@@ -1,24 +1,35 @@
 """Untangle: move the vertices of the worst triangles until these are acceptable.
 
-Relaxation evens out areas, and now and then buys that with a bad triangle. Here only the corners of
-such triangles move, each to where the worst of its one-ring is best: a pattern search in 8 directions
-of the tangent plane. The worst has the smallest angle; or else its centroid lies farthest from the
-reference surface, or its circumcircle is the largest for its target length, which says how far from a
-curved surface its points lie at most. A move owns the closed one-ring of its vertex.
+Relaxation evens out areas, and now and then makes a bad triangle. Here only the corners of such
+triangles move, each to where the worst triangle of its one-ring is best: a pattern search in 8 directions
+of the tangent plane. There are two costs. `untangle_vertices` asks for the smallest angle;
+`approach_vertices` for the largest distance between a centroid and the reference surface, and for the
+largest circumcircle in target lengths, which bounds how far the triangle's points lie from a curved
+surface. A move owns the closed one-ring of its vertex.
 """
 
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.compiler import inlined, threaded
 from ..core.geometry import distance_squared, face_vector, point, tangent_basis, turn_exceeds
-from ..core.vocabulary import DEAD, INNER, NONE, Blocks, IndexArray, Mesh, Tree
-from ..mesh.blocks import DONE, list_range, per_block, per_stage_block, stages, vertex_range
-from ..mesh.walk import next_halfedge, previous_halfedge
+from ..core.vocabulary import DEAD, INNER, NONE, Blocks, Mesh, Tree
+from ..mesh.blocks import (
+    DONE,
+    Candidates,
+    make_candidates,
+    owns,
+    per_block,
+    per_stage_block,
+    slots,
+    stages,
+    vertex_range,
+)
+from ..mesh.walk import corners_of, end_of, next_spoke
 from ..reference.bvh import point_on_face, walk_to_face
 
 __all__ = ["approach_vertices", "untangle_vertices"]
@@ -35,6 +46,17 @@ _DIRECTIONS = np.stack(
     [np.cos(np.arange(8) * np.pi / 4.0), np.sin(np.arange(8) * np.pi / 4.0)], axis=1
 )
 
+# Cost of a ring with a face that has no area or turns over.
+_REFUSED = 1e30
+
+
+class Search(NamedTuple):
+    """What a search looks for, and where."""
+
+    on_surface: bool  # trial positions are walked to the reference surface
+    limit: float  # cost at which a ring is good enough
+    weight: float  # factor of squared distances in the cost; 0: the cost is that of angles
+
 
 def untangle_vertices(
     mesh: Mesh,
@@ -48,22 +70,19 @@ def untangle_vertices(
     """Improve rings with an angle below ``acos(limit)``; returns how many vertices moved.
 
     With ``on_surface`` every trial position is the closest point that a walk on the reference surface
-    finds, so that no projection spoils afterwards what was gained. Rounds after the first look at rings
-    that the one before has changed.
+    finds, so that no later projection spoils the gain. Rounds after the first look at rings that the
+    previous round has changed.
     """
     n = mesh.vertex_halfedge.size
-    candidates = np.empty(n, np.int32)
+    candidates = make_candidates(blocks.vertex)
     moved = np.ones(n, np.uint8)
     total = 0
     for _ in range(rounds):
         bad, near = np.zeros(n, np.uint8), np.zeros(n, np.uint8)
         _mark_bad_faces(parallel, mesh, blocks, limit, moved, bad, near)
-        count = np.zeros(len(blocks.face) - 1, np.int64)
-        _list_marked(parallel, mesh, blocks, bad, near, candidates, count)
-        moved[:] = 0
-        _search_rings(
-            mesh, blocks, tree, on_surface, limit, 0.0, candidates, count, moved, parallel
-        )
+        _list_marked(parallel, mesh, blocks, bad, near, candidates)
+        search = Search(on_surface, limit, 0.0)
+        moved = _search_rings(mesh, blocks, tree, search, candidates, parallel)
         n_moved = int(np.count_nonzero(moved))
         if not n_moved:
             break
@@ -85,33 +104,22 @@ def approach_vertices(
     ``limit`` is a squared circumradius in squared target lengths that costs as much as the distance.
     Returns how many vertices moved.
     """
-    n = mesh.vertex_halfedge.size
-    candidates = np.empty(n, np.int32)
-    count = np.zeros(len(blocks.face) - 1, np.int64)
-    weight = limit / distance**2  # both costs against one limit
-    _find_far_rings(parallel, mesh, blocks, tree, limit, weight, candidates, count)
-    moved = np.zeros(n, np.uint8)
-    _search_rings(mesh, blocks, tree, on_surface, limit, weight, candidates, count, moved, parallel)
+    candidates = make_candidates(blocks.vertex)
+    search = Search(on_surface, limit, limit / distance**2)  # both costs against one limit
+    _find_far_rings(parallel, mesh, blocks, tree, search, candidates)
+    moved = _search_rings(mesh, blocks, tree, search, candidates, parallel)
     return int(np.count_nonzero(moved))
 
 
 def _search_rings(
-    mesh: Mesh,
-    blocks: Blocks,
-    tree: Tree,
-    on_surface: bool,
-    limit: float,
-    weight: float,
-    candidates: IndexArray,
-    count: NDArray[np.int64],
-    moved: NDArray[np.uint8],
-    parallel: bool,
-) -> None:
-    if count.any():
+    mesh: Mesh, blocks: Blocks, tree: Tree, search: Search, candidates: Candidates, parallel: bool
+) -> np.ndarray:
+    """Search for better places of the candidates; returns marks of the vertices that moved."""
+    moved = np.zeros(mesh.vertex_halfedge.size, np.uint8)
+    if candidates.counts.any():
         for stage in stages(blocks):
-            _untangle(
-                parallel, mesh, blocks, stage, tree, on_surface, limit, weight, candidates, count, moved
-            )  # fmt: skip
+            _untangle(parallel, mesh, blocks, stage, tree, search, candidates, moved)
+    return moved
 
 
 @threaded(per_block)
@@ -123,12 +131,8 @@ def _mark_bad_faces(span, mesh, blocks, limit, moved, bad, near):
     X = mesh.X
     for k in range(span[0], span[1]):
         for f in range(blocks.face[k], blocks.face[k + 1]):
-            a = mesh.origin[3 * f]
-            if a == DEAD:
-                continue
-            b = mesh.origin[3 * f + 1]
-            c = mesh.origin[3 * f + 2]
-            if not moved[a] | moved[b] | moved[c]:
+            a, b, c = corners_of(mesh.origin, f)
+            if a == DEAD or not moved[a] | moved[b] | moved[c]:
                 continue
             near[a] = 1
             near[b] = 1
@@ -147,70 +151,68 @@ def _mark_bad_faces(span, mesh, blocks, limit, moved, bad, near):
 
 
 @threaded(per_block)
-def _list_marked(span, mesh, blocks, bad, near, candidates, count):
+def _list_marked(span, mesh, blocks, bad, near, candidates):
+    """List the inner vertices with both marks."""
     for k in range(span[0], span[1]):
-        end = blocks.vertex[k]
+        end = candidates.starts[k]
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
-            candidates[end] = v
+            candidates.items[end] = v
             end += (bad[v] & near[v]) == 1 and mesh.kind[v] == INNER
-        count[k] = end - blocks.vertex[k]
+        candidates.counts[k] = end - candidates.starts[k]
 
 
 @threaded(per_block)
-def _find_far_rings(span, mesh, blocks, tree, limit, weight, candidates, count):
+def _find_far_rings(span, mesh, blocks, tree, search, candidates):
+    """List the inner vertices whose ring costs more than the limit.
+
+    Only a distance makes a ring bad, a large circle alone does not: the surface may be flat there.
+    """
+    everywhere = 0, mesh.vertex_halfedge.size
     for k in range(span[0], span[1]):
         ring = np.empty((_CAPACITY, 3))
-        end = blocks.vertex[k]
+        end = candidates.starts[k]
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != INNER:
                 continue
-            n = _copy_ring(
-                mesh.origin, mesh.twin, mesh.vertex_halfedge, mesh.X, v, 0, 1 << 40, ring
-            )
+            n = _copy_ring(mesh, v, everywhere, ring)
             if n > 0:
-                x, y, z = mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2]
-                face = np.int64(mesh.birth[v]) // 3
-                # Only a distance makes a ring bad, not a circle alone: the surface may be flat there.
-                if _cost(ring, n, x, y, z, x, y, z, weight, 0.0, tree, face) > limit:
-                    candidates[end] = v
+                p = point(mesh.X, v)
+                if (
+                    _cost(ring, n, p, p, search.weight, 0.0, tree, mesh.birth[v] // 3)
+                    > search.limit
+                ):
+                    candidates.items[end] = v
                     end += 1
-        count[k] = end - blocks.vertex[k]
+        candidates.counts[k] = end - candidates.starts[k]
 
 
 @threaded(per_stage_block)
-def _untangle(span, mesh, blocks, stage, tree, on_surface, limit, weight, candidates, count, moved):
+def _untangle(span, mesh, blocks, stage, tree, search, candidates, moved):
+    """Move the candidates whose closed one-ring the blocks of a stage own."""
     for k in range(span[0], span[1]):
-        low, high = vertex_range(blocks, stage, k)
-        first, end = list_range(blocks, stage, k)
+        owned = vertex_range(blocks, stage, k)
         ring = np.empty((_CAPACITY, 3))
-        for j in range(first, end):
-            for i in range(blocks.vertex[j], blocks.vertex[j] + count[j]):
-                v = np.int64(candidates[i])
-                if v == DONE or v < low or v >= high:
-                    continue
-                n = _copy_ring(
-                    mesh.origin, mesh.twin, mesh.vertex_halfedge, mesh.X, v, low, high, ring
-                )
-                if n > 0:
-                    candidates[i] = DONE
-                    moved[v] = _search(
-                        mesh.X, mesh.birth, v, ring, n, tree, on_surface, limit, weight
-                    )
+        for i in slots(candidates, blocks, stage, k):
+            v = candidates.items[i]
+            if v == DONE or not owns(owned, v):
+                continue
+            n = _copy_ring(mesh, v, owned, ring)
+            if n > 0:
+                candidates.items[i] = DONE
+                moved[v] = _search(mesh, v, ring, n, tree, search)
 
 
 @inlined
-def _copy_ring(origin, twin, vertex_halfedge, X, v, low, high, ring):
-    """Copy the ring's coordinates; returns their number, 0 where one lies outside the range."""
-    start = np.int64(vertex_halfedge[v])
+def _copy_ring(mesh, v, owned, ring):
+    """Copy the ring's coordinates; returns their number, 0 if one lies outside the block's range."""
+    start = mesh.vertex_halfedge[v]
     h = start
     for i in range(_CAPACITY):
-        w = origin[next_halfedge(h)]
-        if w < low or w >= high:
+        w = end_of(mesh.origin, h)
+        if not owns(owned, w):
             return 0
-        ring[i, 0] = X[w, 0]
-        ring[i, 1] = X[w, 1]
-        ring[i, 2] = X[w, 2]
-        h = np.int64(twin[previous_halfedge(h)])
+        ring[i, 0], ring[i, 1], ring[i, 2] = point(mesh.X, w)
+        h = next_spoke(mesh.twin, h)
         if h == NONE:
             return 0
         if h == start:
@@ -219,51 +221,41 @@ def _copy_ring(origin, twin, vertex_halfedge, X, v, low, high, ring):
 
 
 @inlined
-def _cost(ring, n, x, y, z, x0, y0, z0, weight, scale, tree, face):
-    """Cosine of the smallest angle around (x, y, z); with a weight, what `untangle_vertices` says.
-
-    1e30 where a face has no area or turns by more than 60 degrees against the ring around (x0, y0, z0).
-    Against the vertex normal instead, rings around tips never improve: they have faces on all sides.
-    """
-    worst = -1.0
-    px, py, pz = ring[n - 1, 0] - x, ring[n - 1, 1] - y, ring[n - 1, 2] - z
-    pp = px * px + py * py + pz * pz
-    for i in range(n):
-        qx, qy, qz = ring[i, 0] - x, ring[i, 1] - y, ring[i, 2] - z
-        qq = qx * qx + qy * qy + qz * qz
-        pq = px * qx + py * qy + pz * qz
-        rr = pp + qq - 2.0 * pq
-        # The smallest angle lies opposite the shortest side.
-        if rr <= pp and rr <= qq:
-            cosine = pq / sqrt(pp * qq)
-        elif pp <= qq:
-            cosine = (qq - pq) / sqrt(qq * rr)
+def _search(mesh, v, ring, n, tree, search):
+    """Search for the place of a vertex with the lowest cost; returns 1 if the vertex moved."""
+    home = point(mesh.X, v)
+    scale = 1.0 / mesh.X[v, 3] ** 2
+    length, basis = _tangent_plane(ring, n, home)
+    if length == 0.0:
+        return 0
+    p, face = home, mesh.birth[v] // 3
+    best = _cost(ring, n, p, home, search.weight, scale, tree, face)
+    step = _FIRST_STEP
+    moved = 0
+    for _ in range(_SEARCH_ROUNDS):
+        if best <= search.limit or step < _LAST_STEP:
+            break
+        better_p, better_face, better = p, face, best
+        for i in range(8):
+            q, f = _trial(tree, p, face, basis, step * length, i, search.on_surface)
+            trial = _cost(ring, n, q, home, search.weight, scale, tree, f)
+            if trial < better:
+                better_p, better_face, better = q, f, trial
+        if better < best:
+            p, face, best = better_p, better_face, better
+            moved = 1
         else:
-            cosine = (pp - pq) / sqrt(pp * rr)
-        if not cosine < 1.0:
-            return 1e30
-        if weight > 0.0:
-            centroid = x + (px + qx) / 3.0, y + (py + qy) / 3.0, z + (pz + qz) / 3.0
-            _, _, _, d = walk_to_face(tree, centroid, face)
-            nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
-            radius = 0.25 * pp * qq * rr / (nx * nx + ny * ny + nz * nz)
-            cosine = max(weight * d, scale * radius)
-        worst = max(worst, cosine)
-        if x != x0 or y != y0 or z != z0:
-            j = i - 1 if i > 0 else n - 1
-            ox, oy, oz = face_vector((x0, y0, z0), point(ring, j), point(ring, i))
-            nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
-            if ox * ox + oy * oy + oz * oz > 0.0 and turn_exceeds((ox, oy, oz), (nx, ny, nz), 0.5):
-                return 1e30
-        px, py, pz, pp = qx, qy, qz, qq
-    return worst
+            step *= 0.5
+    if moved:
+        mesh.X[v, 0], mesh.X[v, 1], mesh.X[v, 2] = p
+        mesh.birth[v] = 3 * face
+    return moved
 
 
 @inlined
-def _search(X, birth, v, ring, n, tree, on_surface, limit, weight):
-    """Pattern search; returns 1 if the vertex moved."""
-    x, y, z = X[v, 0], X[v, 1], X[v, 2]
-    scale = 1.0 / X[v, 3] ** 2
+def _tangent_plane(ring, n, p):
+    """Return the mean spoke and two tangent vectors of a ring; a length of 0 where it has no normal."""
+    x, y, z = p
     nx = ny = nz = length = 0.0
     px, py, pz = ring[n - 1, 0] - x, ring[n - 1, 1] - y, ring[n - 1, 2] - z
     for i in range(n):
@@ -276,34 +268,98 @@ def _search(X, birth, v, ring, n, tree, on_surface, limit, weight):
     length /= n
     norm = sqrt(nx * nx + ny * ny + nz * nz)
     if norm == 0.0:
-        return 0
-    sx, sy, sz, tx, ty, tz = tangent_basis(nx / norm, ny / norm, nz / norm)
-    face = np.int64(birth[v]) // 3
-    best = _cost(ring, n, x, y, z, x, y, z, weight, scale, tree, face)
-    step = _FIRST_STEP
-    moved = 0
-    for _ in range(_SEARCH_ROUNDS):
-        if best <= limit or step < _LAST_STEP:
-            break
-        bx, by, bz, better_face = x, y, z, face
-        better = best
-        for i in range(8):
-            s = step * length * _DIRECTIONS[i, 0]
-            t = step * length * _DIRECTIONS[i, 1]
-            cx, cy, cz = x + s * sx + t * tx, y + s * sy + t * ty, z + s * sz + t * tz
-            f = face
-            if on_surface:
-                f, s, t, _ = walk_to_face(tree, (cx, cy, cz), face)
-                cx, cy, cz = point_on_face(tree.corners, f, s, t)
-            trial = _cost(ring, n, cx, cy, cz, X[v, 0], X[v, 1], X[v, 2], weight, scale, tree, f)
-            if trial < better:
-                bx, by, bz, better_face, better = cx, cy, cz, f, trial
-        if better < best:
-            x, y, z, face, best = bx, by, bz, better_face, better
-            moved = 1
-        else:
-            step *= 0.5
-    if moved:
-        X[v, 0], X[v, 1], X[v, 2] = x, y, z
-        birth[v] = 3 * face
-    return moved
+        return 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return length, tangent_basis(nx / norm, ny / norm, nz / norm)
+
+
+@inlined
+def _trial(tree, p, face, basis, step, i, on_surface):
+    """Return the trial position in direction ``i``, and the reference face to walk from there."""
+    x, y, z = p
+    sx, sy, sz, tx, ty, tz = basis
+    s = step * _DIRECTIONS[i, 0]
+    t = step * _DIRECTIONS[i, 1]
+    q = x + s * sx + t * tx, y + s * sy + t * ty, z + s * sz + t * tz
+    if on_surface:
+        face, s, t, _ = walk_to_face(tree, q, face)
+        q = point_on_face(tree.corners, face, s, t)
+    return q, face
+
+
+@inlined
+def _cost(ring, n, p, home, weight, scale, tree, face):
+    """Cost of a ring around ``p``: that of its worst triangle, by angle or, with a weight, by distance.
+
+    Refused where a face has no area or turns over against the ring around ``home``.
+    """
+    x, y, z = p
+    worst = -1.0
+    u = ring[n - 1, 0] - x, ring[n - 1, 1] - y, ring[n - 1, 2] - z
+    uu = _dot(u, u)
+    for i in range(n):
+        w = ring[i, 0] - x, ring[i, 1] - y, ring[i, 2] - z
+        ww = _dot(w, w)
+        uw = _dot(u, w)
+        cost = _angle_cost(uu, ww, uw)
+        if not cost < 1.0:
+            return _REFUSED
+        if weight > 0.0:
+            cost = _distance_cost(p, u, w, weight, scale, tree, face)
+        worst = max(worst, cost)
+        if (x != home[0] or y != home[1] or z != home[2]) and _turns_over(ring, n, i, home, u, w):
+            return _REFUSED
+        u, uu = w, ww
+    return worst
+
+
+@inlined
+def _dot(u, w):
+    return u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
+
+
+@inlined
+def _angle_cost(uu, ww, uw):
+    """Cosine of the smallest angle of a triangle, from the scalar products of two of its sides.
+
+    Not below 1 (1 or NaN) for a triangle without area.
+    """
+    rr = uu + ww - 2.0 * uw
+    # The smallest angle lies opposite the shortest side.
+    if rr <= uu and rr <= ww:
+        return uw / sqrt(uu * ww)
+    if uu <= ww:
+        return (ww - uw) / sqrt(ww * rr)
+    return (uu - uw) / sqrt(uu * rr)
+
+
+@inlined
+def _distance_cost(p, u, w, weight, scale, tree, face):
+    """Larger of the weighted squared distance of a centroid from the surface and a scaled circumradius.
+
+    The triangle has corners ``p``, ``p + u`` and ``p + w``.
+    """
+    x, y, z = p
+    ux, uy, uz = u
+    wx, wy, wz = w
+    centroid = x + (ux + wx) / 3.0, y + (uy + wy) / 3.0, z + (uz + wz) / 3.0
+    _, _, _, d = walk_to_face(tree, centroid, face)
+    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+    uu, ww = _dot(u, u), _dot(w, w)
+    rr = uu + ww - 2.0 * _dot(u, w)
+    radius = 0.25 * uu * ww * rr / (nx * nx + ny * ny + nz * nz)
+    return max(weight * d, scale * radius)
+
+
+@inlined
+def _turns_over(ring, n, i, home, u, w):
+    """Tell whether a face turns by more than 60 degrees against the same face around ``home``.
+
+    Against the vertex normal instead, rings around tips would never improve: they have faces on all
+    sides.
+    """
+    j = i - 1 if i > 0 else n - 1
+    old = ox, oy, oz = face_vector(home, point(ring, j), point(ring, i))
+    ux, uy, uz = u
+    wx, wy, wz = w
+    new = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+    return ox * ox + oy * oy + oz * oz > 0.0 and turn_exceeds(old, new, 0.5)

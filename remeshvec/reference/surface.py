@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..core.vocabulary import FloatArray, IndexArray, Tree
+from ..features.polyline import Polylines
 from .bvh import Surface
 
 __all__ = ["Reference"]
@@ -23,3 +24,8 @@ class Reference(NamedTuple):
     def tree(self) -> Tree:
         """The tree over its faces, built when it is first asked for."""
         return self.surface.tree
+
+    @property
+    def polylines(self) -> Polylines:
+        """The polylines of its feature curves, for kernels."""
+        return Polylines(self.X, self.origin, self.curve_neighbours, self.arcs)
