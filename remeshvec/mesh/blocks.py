@@ -24,10 +24,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.compiler import inlined
-from ..core.vocabulary import Blocks, IndexArray, Mesh
+from ..core.vocabulary import Blocks, IndexArray, IntArray, Mesh
 
 __all__ = [
     "DONE",
@@ -71,11 +70,11 @@ class Candidates(NamedTuple):
     """
 
     items: IndexArray
-    starts: NDArray[np.int64]
-    counts: NDArray[np.int64]
+    starts: IntArray
+    counts: IntArray
 
 
-def make_candidates(starts: NDArray[np.int64]) -> Candidates:
+def make_candidates(starts: IntArray) -> Candidates:
     """Allocate empty lists, see `Candidates`; a block needs no more slots than it has elements."""
     counts = np.zeros(len(starts) - 1, np.int64)
     return Candidates(np.empty(int(starts[-1]), np.int32), starts, counts)

@@ -10,11 +10,10 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.compiler import inlined
 from ..core.geometry import SHARP
-from ..core.vocabulary import INNER, NONE, FloatArray
+from ..core.vocabulary import INNER, NONE, FloatArray, IntArray
 from ..mesh.blocks import owns
 from ..mesh.walk import apex_of, end_of, next_spoke
 from .outcomes import COLLAPSED, KEPT_LINK, KEPT_OVERSHOOT, NOT_OWNED
@@ -36,11 +35,11 @@ RING_CAPACITY = 128
 class Rings(NamedTuple):
     """Scratch: the closed one-rings of both ends of an edge, a in row 0 and b in row 1."""
 
-    face: NDArray[np.int64]  # (2, k) outgoing half-edges of the end
-    vertex: NDArray[np.int64]  # (2, k) ring vertices; one more than faces around a boundary vertex
+    face: IntArray  # (2, k) outgoing half-edges of the end
+    vertex: IntArray  # (2, k) ring vertices; one more than faces around a boundary vertex
     place: FloatArray  # (2, k, 4) rows of ``Mesh.X`` of the ring vertices
     normal: FloatArray  # (2, k, 4) area vectors of the faces and their lengths
-    size: NDArray[np.int64]  # (2, 2) number of faces, number of ring vertices
+    size: IntArray  # (2, 2) number of faces, number of ring vertices
 
 
 def make_rings() -> Rings:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..core.compiler import inlined, kernel, threaded
 from ..core.geometry import distance_squared
-from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, IndexArray, Mesh
+from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, IndexArray, IntArray, Mesh
 from ..mesh.blocks import make_candidates, owns_all, per_block
 from ..mesh.edge_curves import is_feature
 from ..mesh.walk import corners_of, end_of
@@ -58,7 +58,7 @@ class Numbering(NamedTuple):
     first_child: IndexArray
     vertex: IndexArray
     midpoint: IndexArray
-    end: NDArray[np.int64]
+    end: IntArray
 
 
 def split_long_edges(
@@ -160,7 +160,7 @@ def _refine(
     return refined, n_split
 
 
-def _ends_of_blocks(sizes: NDArray[np.int64], spare: float) -> NDArray[np.int64]:
+def _ends_of_blocks(sizes: IntArray, spare: float) -> NDArray[np.int64]:
     """Lay the blocks of the new mesh end to end, each with its spare faces and half as many vertices."""
     end = np.zeros((len(sizes) + 1, 2), np.int64)
     free = (spare * sizes[:, 0]).astype(np.int64)
