@@ -21,7 +21,7 @@ import remeshvec
 from remeshvec import read_mesh, remesh, write_mesh
 from remeshvec.cli import batch_command as _batch_command
 from remeshvec.cli.batch_files import find_jobs
-from remeshvec.cli.batch_table import COLUMNS, MEASURES, Table
+from remeshvec.cli.batch_table import COLUMNS, MEASURES, ResultTable
 from remeshvec.cli.command import main
 
 # Real workers start in the tests of interrupts, which run the command in a process of its own.
@@ -276,14 +276,14 @@ def test_a_table_that_was_cut_short(folder, calls):
     for cut in range(ends[-3] + 1, len(content), 7):
         Path("out/results.csv").write_bytes(content[:cut])
         whole = sum(end < cut for end in ends) - 1
-        assert len(Table("out/results.csv").rows) == whole
+        assert len(ResultTable("out/results.csv").rows) == whole
     calls.clear()
     assert here() == 0
     assert calls == ALL[5:]
     assert sorted(table()) == ALL
     for short in (b"", content[: ends[0]], content[: ends[0] + 1]):
         Path("out/results.csv").write_bytes(short)
-        assert Table("out/results.csv").rows == {}
+        assert ResultTable("out/results.csv").rows == {}
 
 
 def test_odd_names_survive(folder, calls):

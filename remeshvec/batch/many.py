@@ -165,7 +165,7 @@ def _with_names(items: Iterator[Any], options: dict[str, Any], crew: _Crew) -> I
     def tasks() -> Iterator[Any]:
         for index, item in enumerate(items):
             mesh = _mesh_of(item)
-            held[index] = _name(item), mesh if _is_vertex_face_pair(mesh) else None
+            held[index] = _item_name(item), mesh if _is_vertex_face_pair(mesh) else None
             del item
             yield mesh
 
@@ -217,7 +217,7 @@ def _is_vertex_face_pair(mesh: Any) -> bool:
     return isinstance(mesh, tuple) and len(mesh) == 2
 
 
-def _name(item: Any) -> str:
+def _item_name(item: Any) -> str:
     if isinstance(item, str | os.PathLike):
         return os.fsdecode(item)
     mesh = _mesh_of(item)

@@ -27,7 +27,7 @@ from ..interop.mesh_data import carry
 from ..processes.pool import run_here, run_in_processes
 from .arguments import batch_parser, given_options, target_length
 from .batch_files import FileJob, find_jobs, refuse_collisions
-from .batch_table import COLUMNS, MEASURES, Row, Table, write_parquet
+from .batch_table import COLUMNS, MEASURES, ResultTable, Row, write_parquet
 
 __all__ = ["EXIT_SOME_FAILED", "parsed", "run"]
 
@@ -82,7 +82,7 @@ class _Batch(NamedTuple):
 
     options: argparse.Namespace
     jobs: list[FileJob]
-    table: Table
+    table: ResultTable
     recipe: str  # digest of the options that influence the results
     current: dict[str, Row]  # rows of finished jobs, failed ones included, by output name
 
@@ -100,7 +100,7 @@ class _Batch(NamedTuple):
 def _prepared(options: argparse.Namespace) -> _Batch:
     """Find all files, and refuse what cannot work before any work starts."""
     _check_arguments(options)
-    table = Table(_table_file(options))
+    table = ResultTable(_table_file(options))
     made = {os.path.realpath(os.path.join(options.out, name)) for name in table.rows}
     suffix = f".{options.format}" if options.format else None
     jobs = find_jobs(options.inputs, options.out, suffix, made)

@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import MeshFormatError, OptionError
 from ..files.disk import write_file
 
-__all__ = ["COLUMNS", "MEASURES", "Table", "write_parquet"]
+__all__ = ["COLUMNS", "MEASURES", "ResultTable", "write_parquet"]
 
 # Measures of quality before and after: column names, and attributes of what `quality` returns.
 MEASURES = {
@@ -45,7 +45,7 @@ COLUMNS = (
 Row = dict[str, Any]
 
 
-class Table:
+class ResultTable:
     """Rows, keyed by the name of their output, and the CSV file that holds them."""
 
     def __init__(self, path: str) -> None:
