@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import zoo
+from capillary_shapes import catenoid, catenoid_area, cone
 
 from remeshvec import MeshInputError, OptionError, remesh
 from remeshvec.evolver import CapillaryProblem, minimize
@@ -95,19 +96,6 @@ def test_boundaries_are_wires_by_default():
 # --- minimisation --------------------------------------------------------------------------------
 
 
-def catenoid(half, n=64):
-    V, F = zoo.cylinder(n, 1 + 2 * round(half * n / (2 * np.pi)))
-    V[:, 2] = (V[:, 2] - 1) * half
-    return V, F
-
-
-def catenoid_area(half):
-    a = 1.0
-    for _ in range(5000):
-        a = 1 / np.cosh(half / a)
-    return np.pi * a * a * (np.sinh(2 * half / a) + 2 * half / a)
-
-
 @pytest.mark.parametrize("half", [0.3, 0.5])
 def test_catenoids(half):
     problem = CapillaryProblem(*catenoid(half), tension=2.0)
@@ -180,11 +168,7 @@ def test_bodies_keep_a_volume_each():
 
 
 def test_a_heavy_drop_sags():
-    n = 48
-    t = 2 * np.pi * np.arange(n) / n
-    V = np.vstack([np.column_stack([np.cos(t), np.sin(t), 0 * t]), [[0, 0, 1.0]]])
-    F = np.column_stack([np.arange(n), (np.arange(n) + 1) % n, np.full(n, n)])
-    V, F = remesh(V, F, 0.12, feature_angle=None, boundary="fixed")
+    V, F = remesh(*cone(48, 1.0), 0.12, feature_angle=None, boundary="fixed")
     tops = []
     for density in (0.0, 3.0):
         problem = CapillaryProblem(V, F, volume=1.0, density=density, gravity=(0, 0, -1))

@@ -8,6 +8,7 @@ import nonmanifold
 import numpy as np
 import pytest
 import zoo
+from capillary_shapes import catenoid, catenoid_area, cone
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -28,7 +29,7 @@ def assert_manifold(F):
 
 
 def dumbbell(sides, level=2, thickness=1.0):
-    """Two balls, each without a patch of faces, joined by a ring of so many quads."""
+    """Two balls, each without a patch of faces, joined by a ring of quads."""
     V, F = zoo.icosphere(level)
     if sides == 3:
         ring = F[V[F].mean(axis=1)[:, 2].argmax()]
@@ -95,7 +96,7 @@ def test_small_tips_are_no_necks():
 
 
 def test_flat_patches_are_no_necks():
-    """Nine faces inside of a triangle: many, but no more area than a cap would have."""
+    """Nine faces inside a triangle: many, but not more area than a cap would have."""
     V, F = zoo.icosphere(2)
     for f in (7, -1, -3, -5):
         V = np.vstack([V, V[F[f]].mean(axis=0)])
@@ -106,7 +107,7 @@ def test_flat_patches_are_no_necks():
 
 
 def test_handles_are_cut_too():
-    """A neck that separates nothing: the torus becomes a ball."""
+    """A neck may separate nothing: the torus becomes a ball."""
     V, F = zoo.torus(24, 3)
     found = cut_necks(V, F, np.zeros(len(V), bool), perimeter=0.0)
     assert found.n_cuts >= 1
@@ -138,30 +139,17 @@ def test_a_cube_becomes_a_sphere():
     assert 3.4 < errors[1] / errors[2] < 4.5
 
 
-def catenoid(half, n=64):
-    V, F = zoo.cylinder(n, 1 + 2 * round(half * n / (2 * np.pi)))
-    V[:, 2] = (V[:, 2] - 1) * half
-    return CapillaryProblem(V, F)
-
-
-def catenoid_area(half):
-    a = 1.0
-    for _ in range(5000):
-        a = 1 / np.cosh(half / a)
-    return np.pi * a * a * (np.sinh(2 * half / a) + 2 * half / a)
-
-
 @pytest.mark.parametrize("half", [0.5, 0.6, 0.65])
 def test_catenoids(half):
-    done = evolve(catenoid(half), [0.1], sweeps=100)
+    done = evolve(CapillaryProblem(*catenoid(half)), [0.1], sweeps=100)
     assert done.minimum.converged and done.n_cuts == 0
     assert done.minimum.area == pytest.approx(catenoid_area(half), rel=2e-4)
 
 
 def test_a_catenoid_near_the_limit_stays_and_one_beyond_snaps():
-    done = evolve(catenoid(0.66), [0.1], sweeps=100)
+    done = evolve(CapillaryProblem(*catenoid(0.66)), [0.1], sweeps=100)
     assert done.n_cuts == 0 and done.history[-1]["components"] == 1
-    problem = catenoid(0.67)
+    problem = CapillaryProblem(*catenoid(0.67))
     done = evolve(problem, [0.1], sweeps=100, frames=True)
     assert done.n_cuts >= 1 and done.history[-1]["components"] == 2
     discs = 64 * np.sin(2 * np.pi / 64)
@@ -207,10 +195,8 @@ def test_a_long_bridge_breaks():
 
 
 def test_pinned_drops_follow_young_and_laplace():
-    n, volume = 128, 1.0
-    t = 2 * np.pi * np.arange(n) / n
-    V = np.vstack([np.column_stack([np.cos(t), np.sin(t), 0 * t]), [[0, 0, 1.2]]])
-    F = np.column_stack([np.arange(n), (np.arange(n) + 1) % n, np.full(n, n)])
+    volume = 1.0
+    V, F = cone(128, 1.2)
     for bond in (0.0, 2.0, 5.0):
         problem = CapillaryProblem(V, F, volume=volume, density=bond, gravity=(0, 0, -1))
         done = evolve(problem, [0.25, 0.12, 0.08])

@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 import zoo
+from capillary_shapes import cone
 
 from remeshvec import MeshFormatError, OptionError
 from remeshvec.evolver import (
@@ -24,10 +25,7 @@ needs_evolver = pytest.mark.skipif(
 
 
 def drop(n=24, **options):
-    t = 2 * np.pi * np.arange(n) / n
-    V = np.vstack([np.column_stack([np.cos(t), np.sin(t), 0 * t]), [[0, 0, 1.0]]])
-    F = np.column_stack([np.arange(n), (np.arange(n) + 1) % n, np.full(n, n)])
-    return evolve(CapillaryProblem(V, F, volume=1.0, **options), [0.25]).minimum.problem
+    return evolve(CapillaryProblem(*cone(n, 1.0), volume=1.0, **options), [0.25]).minimum.problem
 
 
 def film():

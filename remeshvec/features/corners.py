@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import acos, degrees, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,25 +15,32 @@ from .curves import Curves
 
 __all__ = ["find_corners"]
 
-# A curve turns sharply by more than so many degrees, measured over half a target length on both
-# sides.
+# A turn of more degrees than this, measured over half a target length on both sides, is sharp.
 CORNER_TURN = 50.0
 
-# On an arc of any radius the turn over L / 2 is half of that over L; at a corner they are the same.
+# On an arc of any radius the turn over L / 2 is half of the turn over L; at a corner the two are equal.
 CORNER_SHARE = 0.7
 
-# Unless the next corner is near, as at the end of a strip about as wide as L / 2. There the turn
-# over L / 4 still is that over L / 2. At 0.88 the two tests leave no gap between them on a strip of
-# any width; below, they would find corners on a circle of 8 sides.
+# This fails where the next corner is near, as at the end of a strip about as wide as L / 2. There the
+# turn over L / 4 still equals the turn over L / 2. At 0.88 the two tests leave no gap between them on a
+# strip of any width; below, they would find corners on a circle of 8 sides.
 LOCAL_SHARE = 0.88
 
-# Curves shorter than 4 L are measured at this share of their length: a circle turns by 45 degrees
-# there, and a rectangle keeps its corners, up to sides of 3 to 1.
+# Curves shorter than 4 L are measured over this share of their length. A circle turns by 45 degrees
+# there, and a rectangle with sides of up to 3 to 1 keeps its corners.
 SHORT_SHARE = 0.125
 
-# Degrees to which turns are rounded before they are compared, so that the corners of a square are
-# equals whatever the rounding.
+# Turns are rounded to so many degrees before they are compared, so that the corners of a square count as
+# equal whatever the rounding of their coordinates.
 STEP = 1e-6
+
+
+class _Path(NamedTuple):
+    """The vertices of one curve in their order; a loop ends with its first vertex."""
+
+    vertex: IndexArray
+    at: FloatArray  # arc length
+    turn: FloatArray  # degrees where it is sharp, otherwise 0
 
 
 def find_corners(
@@ -44,10 +52,10 @@ def find_corners(
 ) -> BoolArray:
     """Find the corners of feature curves at the scale of the target length.
 
-    A vertex with one, three or more feature edges is one. A vertex inside a curve is one if the
-    curve turns by more than ``angle`` between the points half a target length behind and ahead, does
-    not go on turning beyond (which tells it from an arc of any radius), and turns most within half
-    a target length. A circle has none, a rectangle four.
+    A vertex with one, three or more feature edges is a corner. A vertex inside a curve is a corner if the
+    curve turns by more than ``angle`` between the points half a target length behind and ahead, does not
+    go on turning beyond them (unlike an arc of any radius), and turns more here than anywhere else within
+    half a target length. A circle has no corners, a rectangle four.
 
     Parameters
     ----------
@@ -65,39 +73,37 @@ def find_corners(
     is_corner = (curves.degree != 0) & (curves.degree != 2)
     if len(curves.edges):
         limit = CORNER_TURN if angle is None or isinstance(angle, str) else float(angle)
-        _mark_turns(X, origin, twin, *curves[:3], limit + STEP, is_corner)
+        _mark_turns(X, origin, twin, curves, limit + STEP, is_corner)
     return is_corner
 
 
 @kernel
-def _mark_turns(X, origin, twin, edges, after, before, limit, is_corner):
+def _mark_turns(X, origin, twin, curves, limit, is_corner):
     """Walk every curve once, in one direction, and mark where it turns sharply."""
+    edges = curves.edges
     is_done = np.zeros(origin.size, np.bool_)
-    path = np.empty(edges.size + 1, np.int32)
-    at = np.empty(edges.size + 1)
-    turn = np.empty(edges.size + 1)
+    size = edges.size + 1
+    path = _Path(np.empty(size, np.int32), np.empty(size), np.empty(size))
     for loops in range(2):
         for first in range(edges.size):
-            if is_done[edges[first]] or (not loops and before[first] != NONE):
+            if is_done[edges[first]] or (not loops and curves.before[first] != NONE):
                 continue
-            n = _unroll(X, origin, twin, edges, after, first, is_done, path, at)
-            is_corner[path[0]] |= not loops
-            is_corner[path[n]] |= not loops
+            n = _unroll(X, origin, twin, curves, first, is_done, path)
+            is_corner[path.vertex[0]] |= not loops
+            is_corner[path.vertex[n]] |= not loops
             for i in range(n + 1):
-                turn[i] = 0.0
+                path.turn[i] = 0.0
                 if 0 < i < n or (loops and i == 0):
-                    turn[i] = _sharp_turn(X, path, at, n, loops, i, limit)
-            _mark_largest(X, path, at, n, loops, turn, is_corner)
+                    path.turn[i] = _sharp_turn(X, path, n, loops, i, limit)
+            _mark_largest(X, path, n, loops, is_corner)
 
 
 @inlined
-def _unroll(X, origin, twin, edges, after, first, is_done, path, at):
-    """List the vertices of a curve and their arc lengths; returns the number of its edges.
-
-    The last vertex of a loop is the first one again.
-    """
+def _unroll(X, origin, twin, curves, first, is_done, path):
+    """List the vertices of a curve and their arc lengths; returns the number of its edges."""
+    edges, vertex, at = curves.edges, path.vertex, path.at
     n = 0
-    path[0] = origin[edges[first]]
+    vertex[0] = origin[edges[first]]
     at[0] = 0.0
     i = np.int64(first)
     while i != NONE and not is_done[edges[i]]:
@@ -106,38 +112,39 @@ def _unroll(X, origin, twin, edges, after, first, is_done, path, at):
         if twin[h] != NONE:
             is_done[twin[h]] = True
         n += 1
-        path[n] = origin[next_halfedge(h)]
-        at[n] = at[n - 1] + sqrt(distance_squared(X, path[n - 1], path[n]))
-        i = np.int64(after[i])
+        vertex[n] = origin[next_halfedge(h)]
+        at[n] = at[n - 1] + sqrt(distance_squared(X, vertex[n - 1], vertex[n]))
+        i = np.int64(curves.after[i])
     return n
 
 
 @inlined
-def _reach(X, path, at, n, i):
-    return min(0.5 * X[path[i], 3], SHORT_SHARE * at[n])
+def _reach(X, path, n, i):
+    """Arc length over which the turn at a vertex is measured."""
+    return min(0.5 * X[path.vertex[i], 3], SHORT_SHARE * path.at[n])
 
 
 @inlined
-def _sharp_turn(X, path, at, n, is_loop, i, limit):
+def _sharp_turn(X, path, n, is_loop, i, limit):
     """Turn in degrees where it is sharp and local, otherwise 0."""
-    reach = _reach(X, path, at, n, i)
-    near = _turn(X, path, at, n, is_loop, i, reach)
+    reach = _reach(X, path, n, i)
+    near = _turn(X, path, n, is_loop, i, reach)
     if near <= limit:
         return 0.0
-    if near >= CORNER_SHARE * _turn(X, path, at, n, is_loop, i, 2.0 * reach):
+    if near >= CORNER_SHARE * _turn(X, path, n, is_loop, i, 2.0 * reach):
         return near
-    return near if _turn(X, path, at, n, is_loop, i, 0.5 * reach) >= LOCAL_SHARE * near else 0.0
+    return near if _turn(X, path, n, is_loop, i, 0.5 * reach) >= LOCAL_SHARE * near else 0.0
 
 
 @inlined
-def _turn(X, path, at, n, is_loop, i, reach):
+def _turn(X, path, n, is_loop, i, reach):
     """Angle in degrees between the chords from the point ``reach`` behind and to the one ahead.
 
-    Near the end of an open curve these are its ends.
+    Near the end of an open curve the chord leads to its end.
     """
-    v = path[i]
-    bx, by, bz = _point_along(X, path, at, n, is_loop, at[i] - reach)
-    ax, ay, az = _point_along(X, path, at, n, is_loop, at[i] + reach)
+    v = path.vertex[i]
+    bx, by, bz = _point_along(X, path, n, is_loop, path.at[i] - reach)
+    ax, ay, az = _point_along(X, path, n, is_loop, path.at[i] + reach)
     ax, ay, az = ax - X[v, 0], ay - X[v, 1], az - X[v, 2]
     bx, by, bz = X[v, 0] - bx, X[v, 1] - by, X[v, 2] - bz
     norm = sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz))
@@ -147,8 +154,9 @@ def _turn(X, path, at, n, is_loop, i, reach):
 
 
 @inlined
-def _point_along(X, path, at, n, is_loop, where):
+def _point_along(X, path, n, is_loop, where):
     """Point of the curve at an arc length."""
+    at = path.at
     if is_loop:
         where += at[n] if where < 0.0 else 0.0
         where -= at[n] if where > at[n] else 0.0
@@ -162,7 +170,7 @@ def _point_along(X, path, at, n, is_loop, where):
             high = middle
     step = at[high] - at[low]
     share = (where - at[low]) / step if step > 0.0 else 0.0
-    a, b = path[low], path[high]
+    a, b = path.vertex[low], path.vertex[high]
     return (
         X[a, 0] + share * (X[b, 0] - X[a, 0]),
         X[a, 1] + share * (X[b, 1] - X[a, 1]),
@@ -171,13 +179,14 @@ def _point_along(X, path, at, n, is_loop, where):
 
 
 @inlined
-def _mark_largest(X, path, at, n, is_loop, turn, is_corner):
-    """Mark what turns most within its reach; of equals the vertex with the smaller index."""
+def _mark_largest(X, path, n, is_loop, is_corner):
+    """Mark vertices with the largest turn within reach; of equal ones the smaller vertex."""
+    vertex, at, turn = path
     for i in range(n):
         if turn[i] == 0.0:
             continue
-        # 1e-9: corners that are one reach apart keep each other.
-        reach = _reach(X, path, at, n, i) * (1.0 - 1e-9)
+        # With the factor, corners that are one reach apart both stay.
+        reach = _reach(X, path, n, i) * (1.0 - 1e-9)
         is_largest = True
         for side in (-1, 1):
             j = i
@@ -194,7 +203,7 @@ def _mark_largest(X, path, at, n, is_loop, turn, is_corner):
                 if apart >= reach:
                     break
                 difference = np.rint(turn[j] / STEP) - np.rint(turn[i] / STEP)
-                if difference > 0.0 or (difference == 0.0 and path[j] < path[i]):
+                if difference > 0.0 or (difference == 0.0 and vertex[j] < vertex[i]):
                     is_largest = False
         if is_largest:
-            is_corner[path[i]] = True
+            is_corner[vertex[i]] = True

@@ -1,7 +1,7 @@
-"""Feature curves: feature edges linked to chains through the vertices where exactly two of them meet.
+"""Feature curves: feature edges linked to chains at the vertices where exactly two of them meet.
 
-A feature edge carries a mark on both of its half-edges, or on its only one on the boundary. Chains
-end at corners of the network, where one, three or more feature edges meet.
+A feature edge is marked on both of its half-edges, or on the only one at the boundary. Chains end at
+corners of the network, where one, three or more feature edges meet.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ __all__ = ["Curves", "link_chains"]
 
 
 class Curves(NamedTuple):
-    """Feature half-edges, k of them, and what precedes and follows each on its curve.
+    """Feature half-edges, and which of them precede and follow each other on a curve.
 
-    A chain inside the surface is linked in both directions, one on the boundary along its half-edges
+    A chain inside the surface is linked in both directions, a chain on the boundary along its half-edges
     without twin.
 
     Parameters
@@ -28,12 +28,12 @@ class Curves(NamedTuple):
     edges : (k,) int32
         Feature half-edges, in ascending order.
     after : (k,) int32
-        Place in ``edges`` of the one that leaves the vertex where each ends and continues its curve,
-        where exactly two feature edges meet; -1 elsewhere.
+        Index in ``edges`` of the half-edge that continues the curve where this one ends, if exactly two
+        feature edges meet there; otherwise ``NONE``.
     before : (k,) int32
-        Place of the one that each continues; -1 where there is none.
+        Index of the half-edge that this one continues, or ``NONE``.
     degree : (n,) int32
-        Feature edges at each vertex.
+        Number of feature edges at each vertex.
     """
 
     edges: IndexArray
@@ -58,26 +58,27 @@ def link_chains(origin: IndexArray, twin: IndexArray, is_feature: BoolArray, n: 
         edges, np.full_like(edges, NONE), np.full_like(edges, NONE), np.zeros(n, np.int32)
     )
     if len(edges):
-        _link(origin, twin, *curves, np.zeros((n, 2), np.int32))
+        _link(origin, twin, curves, np.zeros((n, 2), np.int32))
     return curves
 
 
 @kernel
-def _link(origin, twin, edges, after, before, count, leaving):
-    """Link; ``leaving`` is room for the first and last feature half-edge that leave a vertex."""
+def _link(origin, twin, curves, leaving):
+    """Fill the record; ``leaving`` holds the first and last feature half-edge at each vertex, plus 1."""
+    edges, after, before, degree = curves
     for i in range(edges.size):
         h = edges[i]
         v = origin[h]
         if twin[h] < h:  # each edge once; the boundary has no twin
-            count[v] += 1
-            count[origin[next_halfedge(h)]] += 1
+            degree[v] += 1
+            degree[origin[next_halfedge(h)]] += 1
         if leaving[v, 0] == 0:
             leaving[v, 0] = i + 1
         leaving[v, 1] = i + 1
     for i in range(edges.size):
         h = edges[i]
         v = origin[next_halfedge(h)]
-        if count[v] == 2:
+        if degree[v] == 2:
             j = leaving[v, 0] - 1
             if edges[j] == twin[h]:
                 j = leaving[v, 1] - 1

@@ -1,4 +1,4 @@
-"""How sharply the surface turns across its edges: unit normals of all faces, edges that turn far."""
+"""Dihedral angles: unit normals of all faces, and the edges across which they turn far."""
 
 from __future__ import annotations
 
@@ -23,36 +23,39 @@ __all__ = [
     "least_cosine",
 ]
 
-# Degrees by which turns may miss a threshold.
+# Degrees by which a turn may miss a threshold.
 ANGLE_TOLERANCE = 1e-6
 
-# A face flatter than this share of its longest edge and of the target length has no normal of its
-# own: coordinates in single precision turn it by 0.1 degrees and more.
+# A face lower than this share of its longest edge and of the target length has no normal of its own:
+# coordinates in single precision turn it by 0.1 degrees and more.
 SLIVER = 1e-3
+
+# Rounds in which slivers borrow normals.
 SLIVER_ROUNDS = 8
 
-# Kinds of faces.
-PROPER = 0  # with a normal of its own
-LENT = 1  # a sliver, with the normal of a face beside it
-MISSING = 2  # a sliver without
+# States of faces.
+PROPER = 0  # has a normal of its own
+LENT = 1  # a sliver with the normal of a face beside it
+MISSING = 2  # a sliver without normal
 
-_FACES_PER_RANGE = 4096  # in a piece of a loop
+# Faces per piece of a threaded loop.
+_FACES_PER_RANGE = 4096
 
 
 class DihedralAngles(NamedTuple):
-    """Normals, and where they turn.
+    """Normals, and the edges across which they turn.
 
     Parameters
     ----------
     normals : (m, 3) float64
-        Unit normals of faces, 0 where they are missing.
+        Unit normals of the faces, 0 where they are missing.
     state : (m,) uint8
         ``PROPER``, ``LENT`` or ``MISSING``.
     slivers : bool
-        Whether there are others than ``PROPER``.
+        Whether any face is not ``PROPER``.
     edges : (k,) int64
-        Inner edges that turn far enough, those beside a missing normal left out: of their two
-        half-edges the larger, in ascending order.
+        Inner edges that turn far enough, without those beside a missing normal. Each is named by the
+        larger of its half-edges; in ascending order.
     """
 
     normals: FloatArray
@@ -64,7 +67,7 @@ class DihedralAngles(NamedTuple):
 def find_dihedral_angles(
     X: FloatArray, origin: IndexArray, twin: IndexArray, degrees: float, parallel: bool
 ) -> DihedralAngles:
-    """Find the edges that turn by so many degrees or more.
+    """Find the edges that turn by at least ``degrees``.
 
     Parameters
     ----------
@@ -94,17 +97,17 @@ def find_dihedral_angles(
 
 
 def least_cosine(degrees: float) -> float:
-    """Cosine of the normals of faces that turn by an angle, for comparisons."""
-    return cos(radians(min(degrees, 180.0))) - 1e-14  # rounding, for angles near 0
+    """Return the cosine to compare with: normals turn by ``degrees`` or more where theirs is below."""
+    return cos(radians(min(degrees, 180.0))) - 1e-14  # rounding of angles near 0
 
 
 def per_piece(first: Any, halfedges: NDArray[Any], *_: Any) -> int:
-    """Pieces of a loop over faces."""
+    """Return the number of pieces of a loop over faces, whose half-edges come second."""
     return -(-halfedges.size // (3 * _FACES_PER_RANGE))
 
 
 def per_piece_of_twins(twin: NDArray[Any], *_: Any) -> int:
-    """Pieces of a loop over faces."""
+    """Return the number of pieces of a loop over faces, whose half-edges come first."""
     return -(-twin.size // (3 * _FACES_PER_RANGE))
 
 
@@ -145,9 +148,9 @@ def _fill_normals(span, X, origin, normals, state, slivers):
 
 @kernel
 def _lend_normals(X, origin, twin, normals, state):
-    """Give slivers the normal across their longest side that has one, round by round.
+    """Give each sliver the normal of a neighbour, across the longest side that has one, in rounds.
 
-    So a crease that runs along a cap goes over its short sides, in one piece.
+    So a crease that runs along a cap passes over its short sides, in one piece.
     """
     for _ in range(SLIVER_ROUNDS):
         for f in range(origin.size // 3):
@@ -166,9 +169,9 @@ def _lend_normals(X, origin, twin, normals, state):
 
 @threaded(per_piece_of_twins)
 def _list_turns(span, twin, normals, cosine, found, counts):
-    """List edges by pieces: what is stored counts only if the next one does not overwrite it.
+    """List edges per piece, without branches: write every candidate, advance the counter only for hits.
 
-    No processor can predict which of two half-edges is the larger, nor where noise turns.
+    Processors cannot predict which of two half-edges is the larger, nor where noise turns.
     """
     n_faces = normals.shape[0]
     for k in range(span[0], span[1]):
@@ -178,7 +181,7 @@ def _list_turns(span, twin, normals, cosine, found, counts):
             x, y, z = normals[f, 0], normals[f, 1], normals[f, 2]
             for h in range(3 * f, 3 * f + 3):
                 t = twin[h]
-                # A boundary edge does not turn; the branch is foreseen.
+                # A boundary edge does not turn. This branch is predicted well.
                 g = np.uint64(t) // np.uint64(3) if t != NONE else np.uint64(f)
                 turn = x * normals[g, 0] + y * normals[g, 1] + z * normals[g, 2]
                 found[count] = h

@@ -55,7 +55,7 @@ class PlyFile:
         axes = [_as_numbers(self._vertices.scalars[axis], axis) for axis in "xyz"]
         indices, sizes = self._faces.lists[self._indices]
         return PolygonMesh(
-            np.stack(axes, axis=1).astype(np.float64, copy=False),
+            _cast(np.stack(axes, axis=1), np.float64, "x, y, z"),
             _cast(_as_numbers(indices, self._indices), np.int64, self._indices),
             sizes,
             [],
@@ -98,7 +98,7 @@ class PlyFile:
         sizes = self._faces.lists[self._indices][1]
         if not np.array_equal(counts, 2 * sizes):
             return None
-        uv = _as_numbers(values, "texcoord").astype(np.float64).reshape(-1, 2)
+        uv = _cast(_as_numbers(values, "texcoord"), np.float64, "texcoord").reshape(-1, 2)
         return uv[fan_triangles(np.arange(len(uv)), sizes)[0]]
 
 
@@ -120,8 +120,8 @@ def _number(word: bytes, name: str) -> float:
 def _cast(values: NDArray[Any], dtype: Any, name: str) -> NDArray[Any]:
     """Return values in the type that the header states; integers must fit it."""
     kind = np.dtype(dtype)
-    with np.errstate(invalid="ignore", over="ignore"):
-        cast = values.astype(kind)
+    with np.errstate(invalid="ignore", over="ignore"):  # some NaN warn when they are cast
+        cast = values.astype(kind, copy=False)
     if kind.kind in "iu" and not np.array_equal(cast, values):
         raise ValueError(f"the column {name!r} holds something else than integers of its type")
     return cast

@@ -47,7 +47,8 @@ def _facets(data: bytes) -> FloatArray:
     if len(data) < 84 or (not fits and b"\0" not in data):
         raise ValueError("it neither starts with 'solid' nor has the header of a binary STL")
     check_room(size, len(data) - 84, "bytes")
-    return np.frombuffer(data, _FACET, claimed, 84)["corners"].astype(np.float64)
+    with np.errstate(invalid="ignore"):  # some NaN warn when they are cast; they are refused later
+        return np.frombuffer(data, _FACET, claimed, 84)["corners"].astype(np.float64)
 
 
 def _ascii_facets(data: bytes) -> FloatArray:
