@@ -167,21 +167,21 @@ _NOTHING = np.empty(0, np.int32)
 
 def _number_alive(mesh: Mesh, parallel: bool) -> _Numbers:
     """Leave removed faces and vertices out; vertices follow the half-edges that own them."""
-    faces = np.empty(mesh.origin.size // 3, np.int32)
-    vertices, new = np.empty(len(mesh.X), np.int32), np.empty(len(mesh.X), np.int32)
-    cuts = even_ranges(len(faces), parallel)
+    lengths = (mesh.origin.size // 3, len(mesh.X), len(mesh.X))
+    numbers = _Numbers(*(np.empty(size, np.int32) for size in lengths))
+    cuts = even_ranges(len(numbers.faces), parallel)
     sizes = np.zeros((len(cuts) - 1, 2), np.int64)
     starts = np.zeros_like(sizes)
     if len(sizes) > 1:
-        _list_alive(parallel, cuts, mesh, False, starts, sizes, faces, vertices, new)
+        _list_alive(parallel, cuts, mesh, False, starts, sizes, numbers)
         np.cumsum(sizes[:-1], axis=0, out=starts[1:])
-    _list_alive(parallel, cuts, mesh, True, starts, sizes, faces, vertices, new)
+    _list_alive(parallel, cuts, mesh, True, starts, sizes, numbers)
     m, n = sizes.sum(axis=0).tolist()
-    return _Numbers(faces[:m], vertices[:n], new)
+    return _Numbers(numbers.faces[:m], numbers.vertices[:n], numbers.new)
 
 
 @threaded(per_range)
-def _list_alive(span, cuts, mesh, is_filling, starts, sizes, faces, vertices, new):
+def _list_alive(span, cuts, mesh, is_filling, starts, sizes, numbers):
     """List faces and vertices by ranges of all faces, or only count them."""
     for k in range(span[0], span[1]):
         n_faces = starts[k, 0]
@@ -190,14 +190,14 @@ def _list_alive(span, cuts, mesh, is_filling, starts, sizes, faces, vertices, ne
             if mesh.origin[3 * f] == DEAD:
                 continue
             if is_filling:
-                faces[n_faces] = f
+                numbers.faces[n_faces] = f
             n_faces += 1
             for h in range(3 * f, 3 * f + 3):
                 v = mesh.origin[h]
                 if mesh.vertex_halfedge[v] == h:
                     if is_filling:
-                        vertices[n_vertices] = v
-                        new[v] = n_vertices
+                        numbers.vertices[n_vertices] = v
+                        numbers.new[v] = n_vertices
                     n_vertices += 1
         sizes[k, 0] = n_faces - starts[k, 0]
         sizes[k, 1] = n_vertices - starts[k, 1]

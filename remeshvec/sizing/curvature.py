@@ -259,8 +259,10 @@ def _differentiate(part, reach, means, weights, shapes):
 
 
 @inlined
-def _form(shapes, p, i, ax, ay, az, bx, by, bz):
-    """Bilinear form of the symmetric matrix at column ``i``."""
+def _form(shapes, p, i, a, b):
+    """Bilinear form of the symmetric matrix at column ``i``, for two vectors."""
+    ax, ay, az = a
+    bx, by, bz = b
     diagonal = ax * bx * shapes[p, i] + ay * by * shapes[p, i + 1] + az * bz * shapes[p, i + 2]
     xy = (ax * by + ay * bx) * shapes[p, i + 3]
     yz = (ay * bz + az * by) * shapes[p, i + 4]
@@ -280,12 +282,13 @@ def _keep_largest(means, shapes, owner, curvature):
         if norm == 0.0:
             continue
         ax, ay, az, bx, by, bz = tangent_basis(nx / norm, ny / norm, nz / norm)
-        s_aa = _form(shapes, p, 0, ax, ay, az, ax, ay, az)
-        s_ab = _form(shapes, p, 0, ax, ay, az, bx, by, bz)
-        s_bb = _form(shapes, p, 0, bx, by, bz, bx, by, bz)
-        p_aa = _form(shapes, p, 6, ax, ay, az, ax, ay, az)
-        p_ab = _form(shapes, p, 6, ax, ay, az, bx, by, bz)
-        p_bb = _form(shapes, p, 6, bx, by, bz, bx, by, bz)
+        a, b = (ax, ay, az), (bx, by, bz)
+        s_aa = _form(shapes, p, 0, a, a)
+        s_ab = _form(shapes, p, 0, a, b)
+        s_bb = _form(shapes, p, 0, b, b)
+        p_aa = _form(shapes, p, 6, a, a)
+        p_ab = _form(shapes, p, 6, a, b)
+        p_bb = _form(shapes, p, 6, b, b)
         least = 0.5 * (p_aa + p_bb) - sqrt(0.25 * (p_aa - p_bb) ** 2 + p_ab * p_ab)
         lift = max(0.0, _FOLD - least)
         p_aa += lift
