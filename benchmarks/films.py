@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 
+from data.shapes import films
 from remeshvec.evolver import CapillaryProblem, Evolution, Frame, evolve
 
 from .meshes import ROOT
@@ -28,7 +29,7 @@ def cube() -> Picture:
 
 def catenoid() -> Picture:
     """Rings just too far apart: the film snaps into two discs."""
-    done = evolve(_film(0.67), [0.1], sweeps=100, frames=True)
+    done = evolve(CapillaryProblem(*films.catenoid(0.67)), [0.1], sweeps=100, frames=True)
     events = [frame.event for frame in done.frames]
     at = [events.index("cut") - k for k in (6, 3, 1)] + [events.index("cut"), len(events) - 1]
     return Picture(_panels(done, [0, *at]), view=(20.0, 12.0))
@@ -77,18 +78,6 @@ def rings_problem(volume: str, refined: int = 0) -> CapillaryProblem:
         V, F,  # all wires are boundaries
         volume=data[volume], volume_offset=data["cap_volume"], energy_offset=data["cap_area"],
     )  # fmt: skip
-
-
-def _film(half: float, n: int = 64) -> CapillaryProblem:
-    """Film between two rings of radius 1."""
-    rows = 1 + 2 * round(half * n / (2 * np.pi))
-    t, z = np.meshgrid(2 * np.pi * np.arange(n) / n, np.linspace(-half, half, rows), indexing="ij")
-    V = np.stack([np.cos(t), np.sin(t), z], axis=-1).reshape(-1, 3)
-    i, j = np.meshgrid(np.arange(n), np.arange(rows - 1), indexing="ij")
-    a, b = (i * rows + j).ravel(), ((i + 1) % n * rows + j).ravel()
-    return CapillaryProblem(
-        V, np.concatenate([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)])
-    )
 
 
 def _panels(done: Evolution, at: list[int], caption: str = "") -> list[Panel]:

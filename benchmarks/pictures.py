@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from data.shapes.drawn import double_bubble, flag, half_discs, notched_sheet
 from remeshvec import Adaptive, remesh
 from remeshvec.files.data_files import read_data
 
@@ -34,7 +35,6 @@ from .panels import (
     draw,
 )
 from .scenes import bend, bump, smoothing, twist
-from .shapes import double_bubble, flag, half_discs, notched_sheet
 from .tables import DOCS
 
 DATA = Path(__file__).resolve().parents[1] / "data"

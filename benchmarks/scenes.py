@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from data.shapes.drawn import bumpy_bar
 from remeshvec import EditedSurface, Editor, MultiresolutionEditor, deform, quality, remesh, smooth
 
 from .meshes import load
 from .panels import FloatArray, IntArray, Panel, Picture, by_label
-from .shapes import bumpy_bar
 
 QUARTERS = 12  # quarter turns of the bar
 

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import igl
 import numpy as np
-import shapes
-from shapes import Floats, Ints
+from shapes import sculpted
+from shapes.sculpted import Floats, Ints
 
 HERE = Path(__file__).resolve().parent
 TABLE_HEAD = (
@@ -28,13 +28,13 @@ TABLE_HEAD = (
 MESHES: dict[
     str, tuple[Callable[[], tuple[Floats | Ints, ...]], int]
 ] = {  # name -> maker, decimals
-    "creature.obj": (shapes.creature, 5),
-    "bracket.obj": (shapes.bracket, 6),
-    "wavy_sheet.obj": (shapes.wavy_sheet, 5),
-    "pretzel.off": (shapes.pretzel, 5),
-    "linked_rings.off": (shapes.linked_rings, 5),
-    "thin_sheet.obj": (shapes.thin_sheet, 5),
-    "vase.obj": (shapes.vase, 5),  # with texture coordinates
+    "creature.obj": (sculpted.creature, 5),
+    "bracket.obj": (sculpted.bracket, 6),
+    "wavy_sheet.obj": (sculpted.wavy_sheet, 5),
+    "pretzel.off": (sculpted.pretzel, 5),
+    "linked_rings.off": (sculpted.linked_rings, 5),
+    "thin_sheet.obj": (sculpted.thin_sheet, 5),
+    "vase.obj": (sculpted.vase, 5),  # with texture coordinates
 }
 MATERIAL = "newmtl painted\nKd 1 1 1\nmap_Kd vase.png\n"
 
@@ -127,7 +127,7 @@ def main() -> int:
             print(f"{name:<18}{len(V):>7} vertices{len(F):>7} faces{len(text) / 1e3:>7.0f} kB")
     for name, content in (
         ("vase.mtl", MATERIAL.encode()),
-        ("vase.png", as_png(*shapes.vase_texture())),
+        ("vase.png", as_png(*sculpted.vase_texture())),
     ):
         path = HERE / name
         if check and (not path.exists() or path.read_bytes() != content):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import zoo
+from helpers import zoo
 
 from remeshvec import quality
 

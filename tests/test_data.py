@@ -1,7 +1,6 @@
 """The committed meshes are what data/README.md says."""
 
 import hashlib
-import importlib.util
 import re
 import subprocess
 import sys
@@ -9,7 +8,9 @@ import sys
 import igl
 import numpy as np
 import pytest
-import zoo
+from helpers import zoo
+
+from data.shapes import sculpted
 
 TABLE = {
     name: ([int(number.replace(",", "")) for number in counts.split("|")], checksum)
@@ -20,14 +21,6 @@ TABLE = {
     )
 }
 NAMES = list(TABLE)
-
-
-def shapes():
-    """Import data/shapes.py, which is no package."""
-    spec = importlib.util.spec_from_file_location("shapes", zoo.DATA / "shapes.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_the_table_lists_the_files():
@@ -88,7 +81,7 @@ def test_bracket_faces_lie_in_their_planes():
 @pytest.mark.parametrize("name", ["bracket", "wavy_sheet", "linked_rings", "thin_sheet"])
 def test_made_again(name):
     path = next(zoo.DATA.glob(f"{name}.*"))
-    V, F = getattr(shapes(), name)()
+    V, F = getattr(sculpted, name)()
     assert np.array_equal(F, zoo.read(path)[1])
     assert np.allclose(V, zoo.read(path)[0], rtol=0, atol=6e-6)
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import test_evolver_arguments
 import test_modelling_arguments
-import zoo
-from bad_arguments import (
+from helpers import zoo
+from helpers.bad_arguments import (
     INF,
     NAN,
     NOT_COUNTS,
@@ -27,7 +27,7 @@ from bad_arguments import (
     parameters,
     public_methods,
 )
-from bad_arguments import NOT_FLAGS as NOT_FLAGS_OR_NONE
+from helpers.bad_arguments import NOT_FLAGS as NOT_FLAGS_OR_NONE
 
 import remeshvec
 from remeshvec import (

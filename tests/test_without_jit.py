@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import zoo
+from helpers import zoo
 
 from remeshvec import remesh
 
@@ -19,7 +19,7 @@ import json, sys
 import numpy as np, numba
 assert numba.config.DISABLE_JIT
 sys.path.insert(0, "tests")
-import zoo
+from helpers import zoo
 from remeshvec import remesh
 from remeshvec.mesh import blocks
 blocks.FACES_PER_BLOCK = 20
@@ -82,19 +82,22 @@ def test_whole_calls_agree_with_the_jit(monkeypatch):
 @pytest.mark.parametrize(
     ("file", "expression"),
     [
-        ("test_halfedge.py", "tidy or compact or pinched or cut"),
-        ("test_polyline.py", "links or neighbours or arcs or smallest_loops or slot or stretch"),
-        ("test_project.py", "trust or look_away or lengths_are or annulus"),
-        ("test_slide.py", "annulus or l_prism or hole or half_discs or pinned"),
-        ("test_unfold.py", "twin and 0.5 or concave"),
-        ("test_split_curves.py", "halves or frozen or siblings or births"),
-        ("test_collapse_curves.py", "turn or held or seams or overlap"),
-        ("test_split.py", "template or one_round or kinds"),
-        ("test_collapse.py", "link or single or boundary_guard or overshoot or foldover_refuses"),
-        ("test_flip.py", "single or dart or duplicates or poles or sliver_check"),
-        ("test_relax.py", "formula or stiffness or only_inner"),
-        ("test_bvh.py", "size_of_tree or without_area or hint"),
-        ("test_untangle.py", "reach or left_alone or told_to"),
+        ("mesh/test_halfedge.py", "tidy or compact or pinched or cut"),
+        (
+            "features/test_polyline.py",
+            "links or neighbours or arcs or smallest_loops or slot or stretch",
+        ),
+        ("operations/test_project.py", "trust or look_away or lengths_are or annulus"),
+        ("operations/test_slide.py", "annulus or l_prism or hole or half_discs or pinned"),
+        ("operations/test_unfold.py", "twin and 0.5 or concave"),
+        ("operations/test_split_curves.py", "halves or frozen or siblings or births"),
+        ("operations/test_collapse_curves.py", "turn or held or seams or overlap"),
+        ("operations/test_split.py", "template or one_round or kinds"),
+        ("operations/test_collapse.py", "link or single or boundary_guard or overshoot or refuses"),
+        ("operations/test_flip.py", "single or dart or duplicates or poles or sliver_check"),
+        ("operations/test_relax.py", "formula or stiffness or only_inner"),
+        ("reference/test_bvh.py", "size_of_tree or without_area or hint"),
+        ("operations/test_untangle.py", "reach or left_alone or told_to"),
     ],
 )
 def test_kernel_tests_pass_as_plain_python(file, expression):

@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from benchmarks.panels import FloatArray, IntArray, Panel, Picture, borders, by_amount, by_label
-from benchmarks.shapes import flag, notched_sheet
+from data.shapes.drawn import flag, notched_sheet
 from remeshvec import remesh
 
 from .scene import BRACKET, CREATURE, SHEET, mesh, panel, side_by_side

@@ -1,0 +1,474 @@
+"""`remesh_many`: order, the same bytes, what fails fails alone, nothing is kept, nothing is left."""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import io
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import zoo
+from helpers.forked import quick_workers, real_workers  # noqa: F401
+
+from remeshvec import (
+    BatchError,
+    MeshFormatError,
+    MeshInputError,
+    OptionError,
+    RemeshvecError,
+    WorkerError,
+    read_mesh,
+    remesh,
+    remesh_many,
+    write_mesh,
+)
+from remeshvec.batch import progress as _progress
+from remeshvec.processes import pool as _workers
+from remeshvec.processes.worker import END_PATIENCE
+
+ROOT = Path(__file__).resolve().parents[2]
+PATIENCE = 60.0
+
+needs_proc = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc")
+
+
+def meshes():
+    """Small meshes of several kinds: closed, open, with creases, dirty."""
+    V, F = zoo.torus(16, 8)
+    return [
+        (V, F),
+        zoo.grid(9, 9),
+        zoo.genus_2(),
+        (V.astype(np.float32), np.r_[F, F[:1]].astype(np.int32)),
+        (V.tolist(), F.tolist()),
+        zoo.icosphere(2),
+    ]
+
+
+def digest(result):
+    """Hash all that a result holds but for its times, and the threads that it might have used."""
+    report = result.report.to_dict()
+    report.pop("seconds")
+    report["options"].pop("threads")
+    sha = hashlib.sha256(repr(report).encode())
+    for name in ("V", "F", "lengths", "birth_face", "birth_barycentric", "vertex_map", "face_map"):
+        array = getattr(result, name)
+        sha.update(f"{name}{array.dtype}{array.shape}".encode() + array.tobytes())
+    return sha.hexdigest()
+
+
+class Fatal:
+    """Ends the process that unpickles it, as a crash does."""
+
+    def __init__(self, how, *args):
+        self.call = how, args
+
+    def __reduce__(self):
+        return self.call
+
+
+EXIT, KILLED = Fatal(os._exit, 7), Fatal(signal.raise_signal, getattr(signal, "SIGKILL", 15))
+SLEEPS = Fatal(time.sleep, 10 * PATIENCE)
+
+
+def children():
+    """Worker processes that are alive, and those that nobody has waited for."""
+    return children_of("self")
+
+
+def children_of(pid):
+    found = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        with suppress(OSError):  # a thread that has ended
+            found += (task / "children").read_text().split()
+    return found
+
+
+@pytest.fixture
+def no_processes_left():
+    yield
+    if Path("/proc/self/task").exists():
+        assert not children()
+    assert not [t for t in threading.enumerate() if t.name == "remeshvec feeder"]
+
+
+# Real workers start in tests of the results, of the start, and of what workers print.
+pytestmark = [
+    pytest.mark.usefixtures("no_processes_left", "quick_workers"),
+    pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning"),
+]
+
+
+# -- results --------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("real_workers")
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_same_bytes_as_one_at_a_time(workers, tmp_path):
+    V, F = zoo.grid(9, 9)
+    write_mesh(tmp_path / "a.ply", V, F)
+    path = tmp_path / "a.ply"
+    items = [*meshes(), path, str(path), read_mesh(path), remesh(V, F), list(zoo.grid(5, 5))]
+    found = list(remesh_many(items, workers=workers))
+    assert [item.index for item in found] == list(range(len(items)))
+    assert all(item.error is None and item.seconds > 0 for item in found)
+    expected = [digest(remesh(*mesh)) for mesh in meshes()]
+    expected += 3 * [digest(remesh(*read_mesh(path)[:2]))]
+    expected += [digest(remesh(*remesh(V, F))), digest(remesh(*zoo.grid(5, 5)))]
+    assert [digest(item.result) for item in found] == expected
+    assert found[0].name == "128 vertices, 256 faces"
+    assert found[6].name == found[7].name == str(path)
+
+
+def test_options_reach_every_item():
+    V, F = zoo.torus(16, 8)
+    options = {"preset": "fast", "feature_angle": None, "boundary": "split", "iterations": 2}
+    alone = digest(remesh(V, F, 0.3, **options))
+    for workers in (1, 2):
+        found = remesh_many([(V, F)] * 3, 0.3, workers=workers, **options)
+        assert [digest(item.result) for item in found] == 3 * [alone]
+
+
+def test_functions_need_a_module_or_cloudpickle(monkeypatch):
+    V, F = zoo.torus(16, 8)
+    alone = digest(remesh(V, F, lambda points: 0.3 + 0.1 * points[:, 0] ** 2))
+    here = remesh_many([(V, F)], lambda points: 0.3 + 0.1 * points[:, 0] ** 2, workers=1)
+    assert digest(next(here).result) == alone
+    monkeypatch.setitem(sys.modules, "cloudpickle", None)
+    with pytest.raises(OptionError, match=r"cloudpickle.*workers=1"):
+        list(remesh_many([(V, F)], lambda points: points[:, 0], workers=2))
+    monkeypatch.undo()
+    pytest.importorskip("cloudpickle")
+    there = remesh_many([(V, F)], lambda points: 0.3 + 0.1 * points[:, 0] ** 2, workers=2)
+    assert [digest(item.result) for item in there] == [alone]
+
+
+def test_as_completed():
+    """The first item waits for its death, the others do not wait for it."""
+    items = [SLEEPS, *meshes(), *meshes()]
+    found = list(remesh_many(items, workers=2, ordered=False, on_error="collect", timeout=3.0))
+    assert sorted(item.index for item in found) == list(range(13))
+    assert found[0].index != 0
+    slow = next(item for item in found if item.index == 0)
+    assert isinstance(slow.error, WorkerError) and "timeout of 3 s" in str(slow.error)
+    assert [item.index for item in found].index(0) > 4
+    for item in found:
+        if item is not slow:
+            assert digest(item.result) == digest(remesh(*items[item.index]))
+
+
+def test_arguments():
+    mesh = zoo.grid(4, 4)
+    for wrong, word in [
+        ({"on_error": "ignore"}, "on_error"),
+        ({"workers": 0}, "workers"),
+        ({"timeout": -1}, "timeout"),
+        ({"color": 3}, "no option color"),
+    ]:
+        with pytest.raises(OptionError, match=word):
+            remesh_many([mesh], **wrong)
+    assert list(remesh_many([])) == list(remesh_many([], workers=1)) == []
+    with pytest.raises(OptionError, match="iterable of meshes; got an object of type int"):
+        remesh_many(3)
+    with pytest.raises(OptionError, match="single one into a list"):
+        remesh_many("a.obj")
+
+
+# -- lazily ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("ordered", [True, False])
+def test_items_are_taken_when_they_are_needed(workers, ordered):
+    taken, most = [0], 0
+
+    def endless():
+        while True:
+            taken[0] += 1
+            yield zoo.grid(4, 4)
+
+    found = remesh_many(endless(), workers=workers, ordered=ordered)
+    assert taken[0] == 0
+    for done in range(1, 30):
+        assert next(found).error is None
+        most = max(most, taken[0] - done)
+    assert most < _workers.AHEAD * workers if workers > 1 else most == 0
+    found.close()
+
+
+def test_an_error_of_the_callers_generator_reaches_the_caller():
+    def items():
+        yield zoo.grid(4, 4)
+        raise LookupError("no more")
+
+    for workers in (1, 2):
+        with pytest.raises(LookupError, match="no more"):
+            list(remesh_many(items(), workers=workers))
+
+
+@pytest.fixture
+def quick_collection():
+    """Let the garbage collector look only at what a test makes: the rest costs it 0.3 s each time."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
+
+
+@pytest.mark.usefixtures("quick_collection")
+@pytest.mark.parametrize("workers", [1, 2])
+def test_nothing_is_kept_of_what_was_handed_on(workers):
+    import weakref
+
+    alive, arrays = [], []
+
+    def items():
+        for _ in range(12):
+            V, F = zoo.grid(5, 5)
+            arrays.append(weakref.ref(V))
+            yield V, F
+            del V, F
+
+    for item in remesh_many(items(), workers=workers):
+        del item
+        gc.collect()
+        alive.append(sum(array() is not None for array in arrays))
+    assert max(alive) <= _workers.AHEAD * workers
+    gc.collect()
+    assert not any(array() is not None for array in arrays)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_errors_that_are_kept_keep_no_arrays(workers):
+    import weakref
+
+    arrays = []
+
+    def items():
+        for _ in range(4):
+            V, F = zoo.grid(5, 5)
+            V = V * np.nan
+            arrays.append(weakref.ref(V))
+            yield V, F
+            del V, F
+
+    kept = list(remesh_many(items(), workers=workers, on_error="collect"))
+    gc.collect()
+    assert all(isinstance(item.error, MeshInputError) for item in kept)
+    assert not any(array() is not None for array in arrays)
+
+
+# -- what fails -----------------------------------------------------------------------------------
+
+
+def hostile(tmp_path):
+    """Items that fail, with what they fail with."""
+    V, F = zoo.grid(5, 5)
+    (tmp_path / "empty.obj").touch()
+    (tmp_path / "garbage.ply").write_bytes(os.urandom(1000))
+    return [
+        ((V * np.nan, F), MeshInputError),
+        ((V, F + 30), MeshInputError),
+        (tmp_path / "empty.obj", MeshFormatError),
+        (tmp_path / "garbage.ply", MeshFormatError),
+        (tmp_path / "absent.stl", MeshFormatError),
+    ]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_forty_meshes_with_five_hostile_ones(workers, tmp_path):
+    bad = hostile(tmp_path)
+    items = [zoo.grid(4 + k % 5, 5) for k in range(35)]
+    places = [3, 4, 17, 30, 39]
+    for place, (item, _) in zip(places, bad, strict=True):
+        items.insert(place, item)
+    found = list(remesh_many(items, workers=workers, on_error="collect"))
+    failed = [item for item in found if item.error is not None]
+    assert len(found) == 40 and [item.index for item in failed] == places
+    for item, (given, kind) in zip(failed, bad, strict=True):
+        assert type(item.error) is kind and item.result is None
+        if isinstance(given, Path):
+            assert item.name == str(given) and given.name in str(item.error)
+    assert sum(len(item.result.F) > 0 for item in found if item.error is None) == 35
+
+
+def test_a_length_that_is_too_small():
+    found = list(remesh_many([zoo.grid(4, 4)] * 2, 1e-9, workers=2, on_error="collect"))
+    assert [type(item.error) for item in found] == 2 * [OptionError]
+    assert "max_faces" in str(found[0].error)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_first_failure_names_its_input(workers, tmp_path):
+    path = tmp_path / "absent.obj"
+    items = iter([zoo.grid(5, 5), path, zoo.grid(5, 5), tmp_path / "other.obj"])
+    found = remesh_many(items, workers=workers)
+    assert next(found).index == 0
+    with pytest.raises(BatchError, match=r"item 1 \(.*absent\.obj\) failed: .*no such") as caught:
+        next(found)
+    assert isinstance(caught.value, RemeshvecError)
+    assert (caught.value.index, caught.value.name) == (1, str(path))
+    assert isinstance(caught.value.__cause__, MeshFormatError)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (str(again), again.index) == (str(caught.value), 1)
+    assert next(found, None) is None
+
+
+def test_a_worker_that_dies_takes_one_item_with_it():
+    good = zoo.grid(5, 5)
+    items = [good, EXIT, good, KILLED, good, good, EXIT]
+    found = list(remesh_many(items, workers=2, on_error="collect"))
+    assert [item.error is None for item in found] == [item is good for item in items]
+    assert all(isinstance(found[k].error, WorkerError) for k in (1, 3, 6))
+    assert "exit code 7" in str(found[1].error) and "SIGKILL" in str(found[3].error)
+    with pytest.raises(BatchError, match=r"item 1 .*Fatal.*died"):
+        list(remesh_many(items, workers=2))
+
+
+def test_what_cannot_be_sent_fails_alone():
+    good = zoo.grid(5, 5)
+    found = list(remesh_many([good, threading.Lock(), good], workers=2, on_error="collect"))
+    assert [item.error is None for item in found] == [True, False, True]
+    assert "workers=1" in str(found[1].error) and found[1].name == "an object of type lock"
+
+
+def test_unexpected_errors_say_where_they_come_from():
+    class Odd:
+        def __len__(self):
+            raise RuntimeError
+
+    found = list(remesh_many([Odd(), zoo.grid(4, 4)], workers=2, on_error="collect"))
+    assert isinstance(found[0].error, WorkerError) and found[1].error is None
+    found = list(remesh_many([zoo.grid(4, 4)], lambda points: 1 / 0, workers=2, on_error="collect"))
+    assert isinstance(found[0].error, ZeroDivisionError)
+    assert "_remesh_here" in "".join(found[0].error.__notes__)
+
+
+@pytest.mark.usefixtures("real_workers")
+def test_workers_that_cannot_start(monkeypatch):
+    monkeypatch.setattr(_workers, "_START", "import sys; sys.exit(5)")
+    with pytest.raises(WorkerError, match="exit code 5"):
+        list(remesh_many([zoo.grid(4, 4)], workers=2, on_error="collect"))
+
+
+@pytest.mark.usefixtures("real_workers")
+def test_what_workers_print_does_not_disturb():
+    found = list(remesh_many([zoo.grid(5, 5)], callback=print, workers=2, on_error="collect"))
+    assert found[0].error is None and len(found[0].result.F) > 0
+
+
+# -- the end --------------------------------------------------------------------------------------
+
+
+def test_workers_end_when_the_caller_stops_early():
+    start = time.monotonic()
+    for item in remesh_many([zoo.grid(5, 5), *[SLEEPS] * 20], workers=2):
+        assert item.index == 0
+        break
+    assert time.monotonic() - start < 0.5 * PATIENCE
+
+
+def test_calls_at_once():
+    """From several threads, each with workers of its own."""
+    found = {}
+
+    def call(name):
+        found[name] = [digest(i.result) for i in remesh_many(meshes(), workers=2)]
+
+    threads = [threading.Thread(target=call, args=(k,)) for k in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(PATIENCE)
+    assert found[0] == found[1] == [digest(remesh(*mesh)) for mesh in meshes()]
+
+
+SCRIPT = """
+import time
+from remeshvec import remesh_many
+
+class Sleeps:
+    def __reduce__(self):
+        return time.sleep, (600,)
+
+# The first one fails at once, without kernels to be loaded.
+for item in remesh_many(["absent.obj", Sleeps(), Sleeps()], workers=2, on_error="collect"):
+    print(item.index, flush=True)
+"""
+
+
+def alive(pid):
+    """Whether a process is there and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@needs_proc
+@pytest.mark.parametrize("kind", ["SIGINT", "SIGTERM", "SIGKILL"])
+def test_no_worker_survives(kind, tmp_path):
+    """A script without a guard, which is ended while its workers work."""
+    (tmp_path / "script.py").write_text(SCRIPT)
+    process = subprocess.Popen(
+        [sys.executable, str(tmp_path / "script.py")],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout.readline() == "0\n"
+    workers = children_of(process.pid)
+    assert len(workers) == 2 and all(map(alive, workers))
+    start = time.monotonic()
+    process.send_signal(getattr(signal, kind))
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert time.monotonic() - start < END_PATIENCE
+    deadline = time.monotonic() + PATIENCE
+    while any(map(alive, workers)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(map(alive, workers))
+    assert errors.count("Traceback") == (kind == "SIGINT")
+
+
+# -- progress -------------------------------------------------------------------------------------
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_progress_in_a_log(capsys, tmp_path, monkeypatch):
+    items = [zoo.grid(4, 4), tmp_path / "absent.obj", zoo.grid(4, 4)]
+    assert len(list(remesh_many(items, workers=1, progress=True, on_error="collect"))) == 3
+    assert capsys.readouterr().err.endswith("3 of 3 meshes, 1 failed, 0 s\n")
+    monkeypatch.setattr(_progress, "SECONDS", 0.0)
+    list(remesh_many(iter(items[:1]), workers=1, progress=True))
+    assert capsys.readouterr().err == "1 meshes, 0 s\n"
+
+
+def test_progress_on_a_terminal(monkeypatch):
+    def shown():
+        stream = Terminal()
+        assert list(_progress.bar(range(5), 5, lambda k: k == 2, stream)) == list(range(5))
+        return stream.getvalue()
+
+    monkeypatch.setattr(_progress, "BLINK", 0.0)
+    with monkeypatch.context() as context:
+        context.setitem(sys.modules, "rich.progress", None)
+        text = shown()
+    assert text.count("\r\x1b[K") == 5 and "5 of 5 meshes, 1 failed, 0 s" in text
+    pytest.importorskip("rich")
+    text = shown()
+    assert "5/5" in text and "1 failed" in text

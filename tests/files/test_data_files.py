@@ -1,0 +1,336 @@
+"""Files of every kind come back remeshed with what they carried, or say what they cannot hold."""
+
+import json
+
+import numpy as np
+import pytest
+
+from data.shapes import textured
+from remeshvec import MeshFormatError, read_mesh
+from remeshvec.batch.one_file import remesh_file
+from remeshvec.files.data_files import read_data, write_data
+from remeshvec.interop.mesh_data import MeshData
+
+RED_AND_BLUE = np.array([[255, 0, 0], [0, 0, 255]], np.uint8)
+
+
+def loaded_cube():
+    """A cube with a chart a side, a field, colours, and two groups."""
+    V, F, uv = textured.cube(4)
+    top = V[F].mean(axis=1)[:, 2] > 0
+    return MeshData(
+        V,
+        F,
+        {"height": V[:, 2].copy(), "color": RED_AND_BLUE[(V[:, 2] > 0).astype(int)]},
+        {"group": top.astype(np.int32)},
+        {"uv": uv},
+        ("uv", "group"),
+    )
+
+
+def areas(uv):
+    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    return 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def assert_field(data, name="height"):
+    assert np.allclose(data.on_vertices[name].ravel(), data.V[:, 2], atol=1e-6)
+
+
+def assert_charts(data):
+    uv = data.on_corners["uv"] if "uv" in data.on_corners else data.find(next(
+        name for name in data.on_vertices if "uv" in name or "TCoords" in name
+    ))  # fmt: skip
+    assert np.isclose(abs(areas(uv)).sum(), 0.81, rtol=1e-5)
+    assert np.ptp(uv, axis=1).max() < 0.2
+
+
+def assert_groups(data, name="group"):
+    top = data.V[data.F].mean(axis=1)[:, 2] > 0
+    part = data.on_faces[name].ravel()
+    assert len(np.unique(part[top])) == len(np.unique(part[~top])) == 1
+    assert part[top][0] != part[~top][0]
+
+
+def obj_cube(folder):
+    path = folder / "cube.obj"
+    data = loaded_cube()
+    data.extra["group"] = ["lower half", "upper half"]
+    (folder / "cube.mtl").write_text("newmtl a\nmap_Kd t.png\n")
+    write_data(path, data)
+    path.write_text("mtllib cube.mtl\n" + path.read_text())
+    return path
+
+
+def test_obj_keeps_texture_groups_colours_and_material_library(tmp_path):
+    source = obj_cube(tmp_path)
+    (tmp_path / "out").mkdir()
+    target = tmp_path / "out" / "even.obj"
+    result = remesh_file(source, target, 0.3)
+    data, notices = read_data(target)
+    assert not notices and len(data.F) == len(result.F)
+    assert np.array_equal(data.V, result.V)
+    assert_charts(data)
+    assert_groups(data)
+    assert data.extra["group"] == ["lower half", "upper half"]
+    assert target.read_text().startswith("mtllib ../cube.mtl\n")
+    colours = data.on_vertices["color"]
+    assert np.allclose(colours[data.V[:, 2] == 1], [0, 0, 1], atol=0.01)
+
+
+def test_obj_statements_of_all_kinds(tmp_path):
+    path = tmp_path / "odd.obj"
+    path.write_text(
+        "o thing\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0 0\nvt 1 1\nvt 0\n"
+        "usemtl red paint\nf 1/1 2/2 \\\n3/3 4/4 # a comment\ng side\nv 0 0 1\nf -1/1/7 -5/2/7 -4/3/7\n"
+    )
+    data, notices = read_data(path)
+    assert notices == ["polygons were cut: 2 faces became 3 triangles"]
+    assert data.F.tolist() == [[0, 1, 2], [0, 2, 3], [4, 0, 1]]
+    assert data.on_corners["uv"][1].tolist() == [[0, 0], [1, 1], [0, 0]]
+    assert data.on_faces["material"].tolist() == [0, 0, 0] and data.extra["material"] == [
+        "red paint"
+    ]
+    assert data.on_faces["group"].tolist() == [-1, -1, 0] and data.extra["group"] == ["side"]
+    assert data.extra["object"] == ["thing"]
+
+
+def test_a_bad_texture_index_leaves_the_mesh(tmp_path):
+    path = tmp_path / "bad.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/2 3/9\n")
+    data, notices = read_data(path)
+    assert len(data.F) == 1 and not data.on_corners
+    assert "texture coordinate 9; there are 1" in notices[0]
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_ply_keeps_every_property(tmp_path, flat):
+    source, target = tmp_path / "a.ply", tmp_path / "b.ply"
+    data = loaded_cube()
+    if flat:
+        data.on_corners.clear()
+    data.on_vertices["normal"] = data.V / np.linalg.norm(data.V, axis=1, keepdims=True)
+    data.on_vertices["count"] = np.arange(len(data.V))
+    data.on_faces["quality"] = np.linspace(0, 1, len(data.F)).astype(np.float32)
+    data.extra["comments"] = ["TextureFile wood.png"]
+    write_data(source, data)
+    assert np.array_equal(read_mesh(source).V, data.V)
+    result = remesh_file(source, target, 0.3, preserve=data.on_faces["group"])
+    out, _ = read_data(target)
+    assert np.array_equal(out.V, result.V) and np.array_equal(out.F, result.F)
+    assert_field(out)
+    assert_groups(out)
+    assert out.extra["comments"] == ["TextureFile wood.png"]
+    assert out.on_vertices["count"].dtype == np.int32
+    assert out.on_faces["quality"].dtype == np.float32
+    assert out.on_vertices["color"].dtype == np.uint8
+    assert np.allclose(np.linalg.norm(out.on_vertices["normal"], axis=1), 1)
+    if not flat:
+        assert_charts(out)
+
+
+@pytest.mark.parametrize("text", [False, True])
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("mixed", [False, True])
+def test_ply_is_read_as_plyfile_wrote_it(tmp_path, text, order, mixed):
+    plyfile = pytest.importorskip("plyfile")
+    V, F, uv = textured.cube(2)
+    polygons = [row.tolist() for row in F] + [[0, 1, 2, 3]] * mixed
+    texture = [row.ravel() for row in uv] + [np.arange(8.0)] * mixed
+    vertex = np.empty(len(V), [("id", "u2"), ("z", "f8"), ("x", "f8"), ("y", "f8"), ("t", "f4")])
+    vertex["x"], vertex["y"], vertex["z"] = V.T
+    vertex["id"], vertex["t"] = np.arange(len(V)), V[:, 0] / 3
+    # Of a table with lists, plyfile writes scalars of more than a byte in the machine's order.
+    kinds = [("q", "u1"), ("vertex_index", "O"), ("texcoord", "O"), ("group", "i1")]
+    face = np.empty(len(polygons), kinds)
+    face["q"], face["group"] = np.arange(len(polygons)), -(np.arange(len(polygons)) % 3)
+    face["vertex_index"], face["texcoord"] = [
+        np.array([*rows, None], dtype=object)[:-1] for rows in (polygons, texture)
+    ]
+    camera = np.array([(1, 2.5)], [("a", "i4"), ("b", "f8")])
+    tables = [
+        plyfile.PlyElement.describe(camera, "camera"),
+        plyfile.PlyElement.describe(face, "face", val_types={"texcoord": "f8"}),
+        plyfile.PlyElement.describe(vertex, "vertex"),
+    ]
+    plyfile.PlyData(tables, text=text, byte_order=order, comments=["one"]).write(tmp_path / "a.ply")
+    data, notices = read_data(tmp_path / "a.ply")
+    assert len(notices) == mixed
+    row = [*range(len(F)), *[len(F)] * 2 * mixed]
+    assert np.array_equal(data.V, V)
+    assert np.array_equal(data.F, [*F.tolist(), *[[0, 1, 2], [0, 2, 3]] * mixed])
+    assert np.array_equal(data.on_vertices["id"], vertex["id"])
+    assert np.array_equal(data.on_vertices["t"], vertex["t"])
+    assert np.array_equal(data.on_faces["q"], face["q"][row])
+    assert np.array_equal(data.on_faces["group"], face["group"][row])
+    kinds = {name: x.dtype.str for name, x in (data.on_vertices | data.on_faces).items()}
+    assert kinds == {"id": "<u2", "t": "<f4", "q": "|u1", "group": "|i1"}
+    assert np.array_equal(data.on_corners["uv"][: len(F)], uv)
+    if mixed:
+        assert data.on_corners["uv"][-1].tolist() == [[0, 1], [4, 5], [6, 7]]
+    assert data.extra["comments"] == ["one"]
+
+
+def test_ply_is_written_as_plyfile_reads_it(tmp_path):
+    plyfile = pytest.importorskip("plyfile")
+    data = loaded_cube()
+    data.extra["comments"] = ["one", "two"]
+    data.on_vertices["tensor"] = np.arange(4.0 * len(data.V)).reshape(-1, 2, 2)
+    data.on_faces["truth"] = data.F[:, 0] > 9
+    data.on_faces["large"] = np.full(len(data.F), 1 << 40)
+    write_data(tmp_path / "a.ply", data)
+    tables = plyfile.PlyData.read(tmp_path / "a.ply")
+    vertex, face = tables["vertex"], tables["face"]
+    assert tables.comments == ["one", "two"]
+    assert np.array_equal(np.stack([vertex[axis] for axis in "xyz"], axis=1), data.V)
+    assert np.array_equal(np.stack(face["vertex_indices"]), data.F)
+    assert np.array_equal(np.stack(face["texcoord"]), data.on_corners["uv"].reshape(-1, 6))
+    assert np.array_equal(vertex["tensor_2"], data.on_vertices["tensor"][:, 1, 0])
+    assert vertex["red"].dtype == np.uint8 and face["truth"].dtype == np.uint8
+    assert face["large"].dtype == np.float64 and (face["large"] == 1 << 40).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "reason"),
+    [("two words", np.zeros(1), "a blank ends the name"), ("s", np.array(["x"]), "no values of")],
+)
+def test_what_ply_cannot_say_is_named(tmp_path, name, values, reason):
+    data = loaded_cube()
+    data.on_vertices[name] = np.repeat(values, len(data.V))
+    with pytest.raises(MeshFormatError, match=reason):
+        write_data(tmp_path / "a.ply", data)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace(" ", "\t"),
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace(" 3/3", " \\ \r\n 3/3"),
+        lambda text: text.replace("f 1/1 2/2 3/3", "f 1/1 2/2 3/3 # f 1/1"),
+        lambda text: "# a \\\n comment \f \x1c\n" + text,
+        lambda text: text.replace("f 1/1 2/2 3/3", "f -4/-4 -3/-3 -2/-2"),
+        lambda text: text.replace("f 1/1 2/2 3/3", "f 1/1/ 2/2/1 3/3/"),
+    ],
+)
+def test_obj_with_data_has_the_faces_of_the_mesh(tmp_path, change):
+    path = tmp_path / "a.obj"
+    text = (
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+        "usemtl a\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+    )
+    path.write_bytes(change(text).encode())
+    data, _ = read_data(path)
+    assert np.array_equal(data.F, read_mesh(path).F) and data.F.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert data.on_corners["uv"][0].tolist() == [[0, 0], [1, 0], [1, 1]]
+    assert data.on_faces["material"].tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".xdmf", ".msh", ".vtp"])
+def test_formats_with_fields(tmp_path, suffix):
+    for library in {".vtp": ["pyvista"], ".xdmf": ["meshio", "h5py"]}.get(suffix, ["meshio"]):
+        pytest.importorskip(library)
+    source, target = tmp_path / f"a{suffix}", tmp_path / f"b{suffix}"
+    data = loaded_cube()
+    data.on_corners.clear()
+    data.on_vertices.pop("color")
+    assert write_data(source, data) == []
+    result = remesh_file(source, target, 0.3, preserve=data.on_faces["group"])
+    out, _ = read_data(target)
+    assert np.allclose(out.V, result.V, atol=1e-6) and np.array_equal(out.F, result.F)
+    assert_field(out)
+    assert_groups(out)
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".msh", ".xdmf", ".vtp", ".glb"])
+def test_data_of_all_shapes_are_written_or_named(tmp_path, suffix):
+    for library in {".vtp": ["pyvista"], ".glb": ["trimesh"]}.get(suffix, ["meshio", "h5py"]):
+        pytest.importorskip(library)
+    data = loaded_cube()
+    n = len(data.V)
+    data.on_vertices |= {"pair": data.V[:, :2].copy(), "tensor": np.ones((n, 3, 3))}
+    data.on_vertices |= {"four": np.ones((n, 4), np.float32), "truth": data.V[:, 0] > 0}
+    names = {*data.on_vertices, *data.on_faces, *data.on_corners}
+    lost = set(write_data(tmp_path / f"a{suffix}", data))
+    out, notices = read_data(tmp_path / f"a{suffix}")
+    read = {name.lstrip("_") for name in (*out.on_vertices, *out.on_faces, "visual:colour")}
+    found = {name for name in names - lost if name in read or name in ("uv", "color")}
+    assert not notices and found == names - lost
+    assert_field(out, "_height" if suffix == ".glb" else "height")
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".vtp", ".glb"])
+def test_texture_goes_from_obj_to_formats_that_hold_it_at_vertices(tmp_path, suffix):
+    library = {".vtp": "pyvista", ".glb": "trimesh"}.get(suffix, "meshio")
+    pytest.importorskip(library)
+    target = tmp_path / f"even{suffix}"
+    result = remesh_file(obj_cube(tmp_path), target, 0.3)
+    out, _ = read_data(target)
+    assert len(out.F) == len(result.F) and len(out.V) > len(result.V)
+    out.F = out.F.astype(np.int64)
+    assert_charts(out)
+
+
+def test_gltf_keeps_texture_and_image(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    Image = pytest.importorskip("PIL.Image")
+    V, F, uv = textured.cylinder()
+    A, B, t = textured.split_at_seams(V, F, uv)
+    mesh = trimesh.Trimesh(A, B, process=False)
+    image = Image.new("RGB", (4, 4), (10, 200, 30))
+    mesh.visual = trimesh.visual.TextureVisuals(uv=t, image=image)
+    mesh.export(tmp_path / "a.glb")
+    result = remesh_file(tmp_path / "a.glb", tmp_path / "b.glb", 0.3)
+    out = trimesh.load(tmp_path / "b.glb", force="mesh", process=False)
+    assert out.visual.kind == "texture" and len(out.faces) == len(result.F)
+    assert np.isclose(abs(areas(np.asarray(out.visual.uv)[out.faces])).sum(), 1.0, rtol=1e-5)
+    colour = out.visual.material.to_color(out.visual.uv)
+    assert (colour[:, :3] == (10, 200, 30)).all()
+
+
+def test_scenes_of_several_meshes_stay_apart_and_in_place(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    red = trimesh.creation.box()
+    red.visual.vertex_colors = [255, 0, 0, 255]
+    blue = trimesh.creation.icosphere(subdivisions=2)
+    blue.visual.face_colors = [0, 0, 255, 255]
+    scene = trimesh.Scene()
+    scene.add_geometry(red)
+    scene.add_geometry(blue, transform=trimesh.transformations.translation_matrix([5, 0, 0]))
+    scene.export(tmp_path / "a.glb")
+    remesh_file(tmp_path / "a.glb", tmp_path / "b.glb", 0.3)
+    parts = trimesh.load(tmp_path / "b.glb", force="scene").dump(concatenate=False)
+    assert len(parts) == 2
+    box, ball = sorted(parts, key=lambda part: part.bounds[0, 0])
+    assert np.allclose(box.bounds, [[-0.5] * 3, [0.5] * 3], atol=1e-6)
+    assert np.allclose(ball.centroid, [5, 0, 0], atol=0.02)
+    assert (box.visual.vertex_colors[:, :3] == (255, 0, 0)).all()
+
+
+def test_what_a_format_cannot_hold_is_told(tmp_path):
+    data = loaded_cube()
+    assert write_data(tmp_path / "a.stl", data) == ["color", "group", "height", "uv"]
+    assert write_data(tmp_path / "a.json", data) == ["color", "group", "height", "uv"]
+    assert json.loads((tmp_path / "a.json").read_text()).keys() == {"verts", "faces"}
+    assert write_data(tmp_path / "a.obj", data) == ["height"]
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".glb", ".vtp", ".msh"])
+def test_broken_files_end_with_our_exception(tmp_path, suffix):
+    path = tmp_path / f"broken{suffix}"
+    path.write_bytes(b"this is no mesh\n" * 3)
+    with pytest.raises(MeshFormatError, match="broken"):
+        read_data(path)
+    with pytest.raises(MeshFormatError, match=r"no such file|not installed"):
+        read_data(tmp_path / f"missing{suffix}")
+    with pytest.raises(MeshFormatError, match="folder"):
+        (tmp_path / f"d{suffix}").mkdir()
+        read_data(tmp_path / f"d{suffix}")
+
+
+def test_unknown_suffixes_are_named(tmp_path):
+    with pytest.raises(MeshFormatError, match=r"'.xyz' is none of"):
+        write_data(tmp_path / "a.xyz", loaded_cube())
+    with pytest.raises(MeshFormatError, match=r"read only|not installed"):
+        remesh_file(obj_cube(tmp_path), tmp_path / "a.3mf")
