@@ -1,10 +1,8 @@
 """Split long edges: all long edges of a face at once, by template.
 
-One round marks the edges that are too long, counts, and writes the refined mesh into new arrays.
-Compaction and vertex order need no work of their own: children take the place of their face, vertices
-follow the half-edge that owns them (``vertex_halfedge``), midpoints follow theirs. Rounds go on until no
-edge is too long, 3 or 4 in the first sweep, 1 later; each halves the longest edge. Splitting in place in
-half-edge order would never end: a long neighbour moves to a new slot again and again.
+One round marks the long edges, counts, and writes the refined mesh into new arrays: children in the place
+of their face, vertices and midpoints behind the half-edge that owns them. Rounds go on until no edge is
+too long: 3 or 4 in the first sweep, 1 later. In half-edge order, in place, splits would never end.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Worker processes that are forks of the process of the tests, which has loaded the library already.
 
 A worker of the library starts from nothing: importing it and loading its kernels costs 2.6 s of a core,
-which tests of what a batch does with its workers need not pay for each of them. A fork takes 20 ms.
+which tests of what a batch does with its workers need not pay for each of them.
 """
 
 from __future__ import annotations
