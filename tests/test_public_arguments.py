@@ -8,8 +8,7 @@ import re
 
 import numpy as np
 import pytest
-import test_evolver_arguments
-import test_modelling_arguments
+from evolver import test_evolver_arguments
 from helpers import zoo
 from helpers.bad_arguments import (
     INF,
@@ -28,6 +27,7 @@ from helpers.bad_arguments import (
     public_methods,
 )
 from helpers.bad_arguments import NOT_FLAGS as NOT_FLAGS_OR_NONE
+from modelling import test_modelling_arguments
 
 import remeshvec
 from remeshvec import (

@@ -19,7 +19,17 @@ from remeshvec.evolver import EvolverError
 NAN, INF = float("nan"), float("inf")
 HUGE = 10**400  # beyond all floats
 
-NOT_NUMBERS = [True, np.True_, "1", NAN, INF, -INF, HUGE, 1j, [1.0], {}, object()]
+
+class Thing:
+    """Nothing that any argument could be; shown without its address, which would change test names."""
+
+    def __repr__(self):
+        return "thing"
+
+
+THING = Thing()
+
+NOT_NUMBERS = [True, np.True_, "1", NAN, INF, -INF, HUGE, 1j, [1.0], {}, THING]
 NOT_POSITIVE = [*NOT_NUMBERS, 0, -1.0]
 NOT_COUNTS = [True, "1", 0, -1, 1.0, 1.5, NAN, [1], {}]
 NOT_FLAGS = [0, 1, "yes", [], NAN, None]
@@ -27,7 +37,7 @@ NOT_WORDS = ["", "x", 1, True, None, ["y"], {}]
 NOT_TEXTS = [1, None, True, b"a", ["a"]]
 NOT_PATHS = [1, None, True, b"a", ["a"], 2.5]
 NOT_FUNCTIONS = [1, "print", True, [print]]
-NOT_ARRAYS = [3, "a", {}, object(), [[0], [1, 2]], [None]]
+NOT_ARRAYS = [3, "a", {}, THING, [[0], [1, 2]], [None]]
 NOT_INDICES = [*NOT_ARRAYS, [0.5], [-1], [10**6], ["0"], [True], [NAN], [[0], [1]]]
 
 
