@@ -60,7 +60,7 @@ class ObjFile:
         for i, line in enumerate(self._lines):
             places[line.split(None, 1)[0]].append(i)
         self._places = {keyword.decode("latin-1"): np.array(at) for keyword, at in places.items()}
-        self._vertices = points(self._operands("v"))
+        self._vertices = points(self._operands("v"), b"v")
         self._faces = _parse_faces(self._operands("f"))
 
     def _at(self, keyword: str) -> IntArray:

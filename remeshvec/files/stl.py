@@ -63,7 +63,7 @@ def _ascii_facets(data: bytes) -> FloatArray:
     if len(facets) % 7:
         raise ValueError("the last facet is not complete")
     vertices = [[line[6:] for line in facets[k::7]] for k in (2, 3, 4)]
-    return np.stack([points(lines)[:, :3] for lines in vertices], axis=1)
+    return np.stack([points(lines, b"vertex")[:, :3] for lines in vertices], axis=1)
 
 
 def _welded(corners: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -115,8 +115,14 @@ def number_table(lines: Sequence[bytes]) -> NDArray[Any] | None:
     return numbers.reshape(len(lines), -1) if (counts == counts[0]).all() else None
 
 
-def points(lines: Sequence[bytes]) -> FloatArray:
+def points(lines: Sequence[bytes], keyword: bytes = b"") -> FloatArray:
     """Return the numbers of lines that begin with three coordinates.
+
+    Parameters
+    ----------
+    lines : sequence of bytes
+    keyword : bytes
+        Removed from the front of every line; for the message.
 
     Returns
     -------
@@ -125,14 +131,14 @@ def points(lines: Sequence[bytes]) -> FloatArray:
     """
     table = number_table(lines)
     if table is None or table.shape[1] < 3 or not np.isfinite(table[:, :3]).all():
-        table = np.array([_point(line) for line in lines], np.float64).reshape(-1, 3)
+        table = np.array([_point(line, keyword) for line in lines], np.float64).reshape(-1, 3)
     return table.astype(np.float64, copy=False)
 
 
-def _point(line: bytes) -> FloatArray:
+def _point(line: bytes, keyword: bytes) -> FloatArray:
     numbers = floats(b" ".join(line.split()[:3]))
     if numbers is None or len(numbers) < 3 or not np.isfinite(numbers).all():
-        raise ValueError(f"{shown(line)} is not a point: three finite numbers are needed")
+        raise ValueError(f"{shown(keyword + line)} is not a point: three finite numbers are needed")
     return numbers
 
 
