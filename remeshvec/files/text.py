@@ -94,7 +94,7 @@ def word_counts(text: bytes) -> IntArray:
     starts = characters > ord(" ")
     starts[1:] &= characters[:-1] <= ord(" ")
     ends = np.flatnonzero(characters == ord("\n"))
-    return np.diff(np.cumsum(starts)[ends], prepend=0)
+    return np.diff(np.searchsorted(np.flatnonzero(starts), ends), prepend=0)
 
 
 def number_table(lines: Sequence[bytes]) -> NDArray[Any] | None:
