@@ -1,8 +1,8 @@
 """Split long edges: all long edges of a face at once, by template.
 
 One round marks the long edges, counts, and writes the refined mesh into new arrays: children in the place
-of their face, vertices and midpoints behind the half-edge that owns them. Rounds go on until no edge is
-too long: 3 or 4 in the first sweep, 1 later. In half-edge order, in place, splits would never end.
+of their face, vertices and midpoints behind the half-edge that owns them. Rounds (3 or 4 in the first
+sweep) go on until no edge is too long; in place, in half-edge order, splits would never end.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ __all__ = ["MAX_ROUNDS", "SPARE", "compact", "split_edges", "split_long_edges"]
 
 # Every round halves the longest edge: 64 rounds divide any float64 length below any other.
 MAX_ROUNDS = 64
-
 # Where fewer edges than this share of the faces are long, they are split in place.
 _FEW = 1.0 / 16.0
 

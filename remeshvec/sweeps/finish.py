@@ -57,7 +57,7 @@ def finish(work: Work, guard: Guard) -> None:
         if work.featured.on_non_manifold is not None:
             work.put(separate_sheets(work.mesh, work.featured))
     with watch.time("finish"):
-        for trial in guard.attempts(work):
+        for trial in guard.attempts(work, is_compact=True):
             polish(trial)
         refine(work)
         if np.ptp(work.mesh.X[:, 3]) > 0.0:

@@ -22,7 +22,7 @@ _ATTEMPTS = 8
 class Guard:
     """Lets everything pass."""
 
-    def attempts(self, work: Work) -> Iterator[Work]:
+    def attempts(self, work: Work, is_compact: bool = False) -> Iterator[Work]:
         """Yield the work to be changed, once or several times, and judge it after each."""
         yield work
 
@@ -46,10 +46,11 @@ class HoldingGuard(Guard):
         """Let go of all that was held since the mesh was remembered."""
         raise NotImplementedError
 
-    def attempts(self, work: Work) -> Iterator[Work]:
+    def attempts(self, work: Work, is_compact: bool = False) -> Iterator[Work]:
         """Yield copies of the work; the first good one becomes the work, which else stays as it is."""
         monitor = work.monitor
-        work.compact()
+        if not is_compact:
+            work.compact()
         with monitor.watch.time("deviation"):
             self.remember(work.mesh)
         counts = dict(monitor.counts[-1])
@@ -68,4 +69,6 @@ class HoldingGuard(Guard):
                 self.hold(work.mesh, offenders, attempt)
         self.release(work.mesh)
         work.step = np.inf
-        monitor.counts[-1] = {"collapse": 0, "flip": 0, **counts}
+        monitor.counts[-1] = counts | {
+            name: 0 for name in ("collapse", "flip") if name not in counts
+        }
