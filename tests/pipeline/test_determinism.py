@@ -41,6 +41,7 @@ from remeshvec.operations.unfold import undo_folds
 from remeshvec.operations.untangle import approach_vertices, untangle_vertices
 from remeshvec.output import extract
 from remeshvec.reference.bvh import Surface, closest_faces
+from remeshvec.sizing.target_lengths import mesh_size
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -131,6 +132,13 @@ def in_every_way(call):
 
 
 ORDERED: set[str] = set()  # kernels whose pieces were shuffled
+
+
+def test_sizes_are_the_same_in_any_order():
+    """Several pieces of many faces each."""
+    prepared = prepare(*zoo.torus(160, 130), False)
+    results = in_every_way(lambda parallel: mesh_size(prepared, parallel))
+    assert all(result == results[0] for result in results)
 
 
 def test_creases_are_the_same_in_any_order():
