@@ -32,7 +32,7 @@ def serve() -> None:
     gone, for whatever reason.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # KeyboardInterrupt
+    signal.signal(signal.SIGTERM, _leave)
     source = sys.stdin.buffer
     target = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # prints must not end up among the answers
@@ -59,6 +59,14 @@ def _read(source: BinaryIO, messages: queue.SimpleQueue[bytes | None]) -> None:
         _interrupt()
 
 
+def _leave(*_: Any) -> None:
+    """End at once: before the first task there is nothing to clear away.
+
+    An exception in its place could hit the import of an extension module, some of which abort then.
+    """
+    os._exit(0)
+
+
 def _interrupt() -> None:
     """Interrupt the main thread, and end the process if that has no effect."""
     if hasattr(signal, "pthread_kill"):  # also ends system calls
@@ -80,6 +88,7 @@ def _work(messages: queue.SimpleQueue[bytes | None], target: BinaryIO) -> None:
     except Exception as error:
         send(target, pickle.dumps(f"{type(error).__name__}: {error}"))
         return
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # KeyboardInterrupt
     send(target, pickle.dumps(None))
     while (message := messages.get()) is not None:
         send(target, _answer(function, message, common))

@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers import zoo
-from helpers.forked import quick_workers, real_workers  # noqa: F401
 
 from remeshvec import (
     BatchError,
@@ -102,17 +101,12 @@ def no_processes_left():
     assert not [t for t in threading.enumerate() if t.name == "remeshvec feeder"]
 
 
-# Real workers start in tests of the results, of the start, and of what workers print.
-pytestmark = [
-    pytest.mark.usefixtures("no_processes_left", "quick_workers"),
-    pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning"),
-]
+pytestmark = pytest.mark.usefixtures("no_processes_left")
 
 
 # -- results --------------------------------------------------------------------------------------
 
 
-@pytest.mark.usefixtures("real_workers")
 @pytest.mark.parametrize("workers", [1, 2])
 def test_the_same_bytes_as_one_at_a_time(workers, tmp_path):
     V, F = zoo.grid(9, 9)
@@ -354,14 +348,12 @@ def test_unexpected_errors_say_where_they_come_from():
     assert "_remesh_here" in "".join(found[0].error.__notes__)
 
 
-@pytest.mark.usefixtures("real_workers")
 def test_workers_that_cannot_start(monkeypatch):
     monkeypatch.setattr(_workers, "_START", "import sys; sys.exit(5)")
     with pytest.raises(WorkerError, match="exit code 5"):
         list(remesh_many([zoo.grid(4, 4)], workers=2, on_error="collect"))
 
 
-@pytest.mark.usefixtures("real_workers")
 def test_what_workers_print_does_not_disturb():
     found = list(remesh_many([zoo.grid(5, 5)], callback=print, workers=2, on_error="collect"))
     assert found[0].error is None and len(found[0].result.F) > 0

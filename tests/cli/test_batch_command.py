@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from batch.test_batch import PATIENCE, ROOT, alive, children_of, needs_proc
 from helpers import zoo
-from helpers.forked import quick_workers  # noqa: F401
 
 import remeshvec
 from remeshvec import read_mesh, remesh, write_mesh
@@ -23,12 +22,6 @@ from remeshvec.cli import batch_command as _batch_command
 from remeshvec.cli.batch_files import find_jobs
 from remeshvec.cli.batch_table import COLUMNS, MEASURES, ResultTable
 from remeshvec.cli.command import main
-
-# Real workers start in the tests of interrupts, which run the command in a process of its own.
-pytestmark = [
-    pytest.mark.usefixtures("quick_workers"),
-    pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning"),
-]
 
 
 @pytest.fixture
