@@ -57,7 +57,7 @@ def prepare(V: FloatArray, F: NDArray[Any], parallel: bool) -> Prepared:
     if n_repeated:
         faces.note("unreferenced_vertices", len(V) - count_used(faces.F, len(V)))
         faces.keep(drop_degenerate_faces(faces.F), "degenerate_faces")
-    mesh = _connect(V, faces, frame, parallel)
+    mesh = _connect_faces(V, faces, frame, parallel)
     if not n_repeated:
         faces.note("unreferenced_vertices", len(V) - mesh.n_used)
     mesh = _drop_duplicates(mesh, V, faces, frame, parallel)
@@ -66,7 +66,7 @@ def prepare(V: FloatArray, F: NDArray[Any], parallel: bool) -> Prepared:
         faces.note("welded_vertices", int((representative != np.arange(len(V))).sum()))
         faces.F = representative[faces.F]
         faces.keep(drop_degenerate_faces(faces.F), "degenerate_faces")
-        mesh = _connect(V, faces, frame, parallel)
+        mesh = _connect_faces(V, faces, frame, parallel)
         mesh = _drop_duplicates(mesh, V, faces, frame, parallel)
     flipped = None
     if mesh.found.inconsistent_edges or mesh.found.non_manifold_edges:
@@ -75,7 +75,7 @@ def prepare(V: FloatArray, F: NDArray[Any], parallel: bool) -> Prepared:
             faces.note("flipped_faces", int(turned.sum()))
             flipped = np.zeros(len(F), np.bool_)
             flipped[turned if faces.source is None else faces.source[turned]] = True
-            mesh = _connect(V, faces, frame, parallel)
+            mesh = _connect_faces(V, faces, frame, parallel)
     faces.note("non_manifold_edges", mesh.found.non_manifold_edges)
     faces.note("inconsistent_edges", mesh.found.inconsistent_edges)
     if mesh.found.pinched_vertices:
@@ -119,7 +119,9 @@ class _Connected(NamedTuple):
     found: Defects
 
 
-def _connect(V: FloatArray, faces: _RemainingFaces, frame: MeshFrame, parallel: bool) -> _Connected:
+def _connect_faces(
+    V: FloatArray, faces: _RemainingFaces, frame: MeshFrame, parallel: bool
+) -> _Connected:
     if not len(faces.F):
         raise MeshInputError("no face of F has three different corners")
     ordered = order_mesh(V, faces.F, parallel, frame)
@@ -141,7 +143,7 @@ def _drop_duplicates(
     if kept is None:
         return connected
     faces.keep(kept, "duplicate_faces")
-    return _connect(V, faces, frame, parallel)
+    return _connect_faces(V, faces, frame, parallel)
 
 
 def _may_be_double(twin: IndexArray) -> NDArray[np.bool_]:
