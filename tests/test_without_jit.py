@@ -79,6 +79,7 @@ def test_whole_calls_agree_with_the_jit(monkeypatch):
         assert len(birth) == len(expected.birth_face)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "expression"),
     [

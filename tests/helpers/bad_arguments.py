@@ -89,12 +89,17 @@ def name_of(function):
     return function.__qualname__
 
 
+def shown(value):
+    """A short text without memory addresses, so that a test has the same name in every process."""
+    text = re.sub(r" at 0x\w+", "", repr(value))
+    return " ".join(text.split())[:30]
+
+
 def cases(table):
     for function, entry in table.items():
         for name, values in entry.bad.items():
             for value in values:
-                shown = " ".join(repr(value).split())[:30]
-                label = f"{name_of(function)}-{name}-{shown}"
+                label = f"{name_of(function)}-{name}-{shown(value)}"
                 yield pytest.param(function, name, value, id=label)
 
 

@@ -128,7 +128,7 @@ def corner_of_an_l(seed):
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.5, 3.0])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(1))
 @pytest.mark.parametrize("side", ["inside", "outside"])
 def test_no_fold_beside_a_corner_of_a_curve(seed, side, slope):
     """Lengths that grow away from it pull vertices towards it, on the concave side over it.
@@ -140,7 +140,7 @@ def test_no_fold_beside_a_corner_of_a_curve(seed, side, slope):
     featured(mesh, feature_edges=edges, fixed_vertices=[corner, edges[0, 0], edges[-1, -1]])
     away = np.linalg.norm(V[:, :2] - ([0, 0] if side == "inside" else [8, 8]), axis=1)
     mesh.X[:, 3] = 1 + slope * away
-    for _ in range(30):
+    for _ in range(20):
         before = mesh.X.copy()
         relax_vertices(mesh, one_block(mesh), 0.0, False)
         undo_folds(mesh, one_block(mesh), before, False)
