@@ -24,6 +24,7 @@ __all__ = [
     "mean_ratio",
     "mixed_voronoi_areas",
     "point",
+    "squared_length",
     "tangent_basis",
     "turn_exceeds",
 ]
@@ -48,6 +49,14 @@ def distance_squared(X, a, b):
     y = X[a, 1] - X[b, 1]
     z = X[a, 2] - X[b, 2]
     return x * x + y * y + z * z
+
+
+@inlined
+def squared_length(p, q):
+    """Squared distance of two points."""
+    px, py, pz = p
+    qx, qy, qz = q
+    return (px - qx) ** 2 + (py - qy) ** 2 + (pz - qz) ** 2
 
 
 @inlined

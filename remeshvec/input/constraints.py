@@ -12,7 +12,8 @@ from ..core.arguments import choice, number
 from ..core.check import as_array, as_indices, as_mask
 from ..core.vocabulary import EQUAL_DATA, NONE, BoolArray, IndexArray, Mesh
 from ..errors import OptionError
-from ..mesh.edges import edge_keys
+from ..mesh.edges import count_edges, edge_keys
+from ..mesh.mend import Kept
 from ..mesh.walk import ends_of
 from .options import Boundary, RemeshOptions
 
@@ -107,15 +108,30 @@ class Constraints:
                 for side in (h, t)
             )
             for values in self.on_corners:
-                is_jump |= _differ(values, ours, theirs)
+                is_jump |= _differ(values, ours, theirs) & (ours >= 0) & (theirs >= 0)
         jumps = np.zeros(len(mesh.twin), np.bool_)
         jumps[h[is_jump]] = jumps[t[is_jump]] = True
         return jumps
 
     def _corners(self, face: NDArray[Any], v: IndexArray, representative: Any) -> NDArray[np.int64]:
-        """Corners ``3 * face + c`` of the input at vertices of faces."""
+        """Corners ``3 * face + c`` of the input at vertices of faces; -1 where a face was cut."""
         corners = self.F[face] if representative is None else representative[self.F[face]]
-        return np.asarray(3 * face + (corners == v[:, None]).argmax(axis=1))
+        is_here = corners == v[:, None]
+        return np.where(is_here.any(axis=1), 3 * face + is_here.argmax(axis=1), -1)
+
+    def kept(self, n: int) -> Kept:
+        """Vertices and faces of the input, of ``n`` vertices, that stay exactly as they are."""
+        vertices = np.zeros(n, np.bool_)
+        vertices[self.fixed_vertices] = True
+        faces = np.zeros(len(self.F), np.bool_)
+        if self.fixed_faces is not None:
+            faces |= self.fixed_faces
+            vertices[self.F[faces]] = True
+        if self.boundary != "free":
+            ends, uses = count_edges(self.F)
+            vertices[ends[uses == 1]] = True
+            faces |= vertices[self.F].sum(axis=1) >= 2
+        return Kept(vertices, faces)
 
 
 def _halfedges_between(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.vocabulary import FloatArray, IndexArray
+from .edges import components, edge_keys, halfedge_ends
 
 __all__ = [
     "count_used",
@@ -37,9 +38,11 @@ def drop_degenerate_faces(F: IndexArray) -> Indices | None:
 
 
 def drop_duplicate_faces(F: IndexArray, candidates: NDArray[Any] | None = None) -> Indices | None:
-    """Return the first of all faces with the same corners in any order; None if all differ.
+    """Return the faces that are left of those with the same corners; None if all differ.
 
-    Only ``candidates`` (all by default) may be duplicates.
+    The first one of the winding that prevails stays. Where as many face either way, all go if they
+    hang on a surface that is whole without them, as a fin without volume does. Elsewhere the surface is
+    modelled on both sides, and one side stays. Only ``candidates`` (all by default) may be duplicates.
     """
     among = np.arange(len(F)) if candidates is None else np.sort(candidates)
     corners = np.sort(F[among], axis=1)
@@ -48,9 +51,49 @@ def drop_duplicate_faces(F: IndexArray, candidates: NDArray[Any] | None = None) 
     is_new[1:] = (corners[order[1:]] != corners[order[:-1]]).any(axis=1)
     if is_new.all():
         return None
+    group = np.empty(len(order), np.int64)
+    group[order] = np.cumsum(is_new) - 1
+    winding = _windings(F[among])
+    balance = np.bincount(group, winding)
+    size = np.bincount(group)
+    # The first face of the winding that prevails, or of both.
+    prevails = balance[group] * winding >= 0
+    first = np.full(len(size), len(among))
+    np.minimum.at(first, group[prevails], np.flatnonzero(prevails))
     kept = np.ones(len(F), np.bool_)
-    kept[among[order[~is_new]]] = False
+    kept[among[size[group] > 1]] = False
+    kept[among[first]] = True
+    doubled = among[first[(size > 1) & (balance == 0)]]
+    kept[_fins(F, kept, doubled)] = False
     return np.flatnonzero(kept)
+
+
+def _windings(F: IndexArray) -> NDArray[np.int64]:
+    """Return 1 for faces whose corners ascend cyclically, -1 for the others."""
+    a, b, c = F.T
+    return np.where((a < b) ^ (b < c) ^ (c < a), -1, 1)
+
+
+def _fins(F: IndexArray, kept: NDArray[np.bool_], doubled: Indices) -> Indices:
+    """Those of the doubled faces whose parts hang on edges that have two single faces without them.
+
+    Where more of the edges around a part have one single face, the part fills a hole.
+    """
+    if not len(doubled):
+        return doubled
+    single = kept.copy()
+    single[doubled] = False
+    n = int(F.max()) + 1
+    edges, place = np.unique(edge_keys(halfedge_ends(F[doubled]), n), return_inverse=True)
+    face = np.arange(len(doubled)).repeat(3)
+    count, label = components(len(doubled) + len(edges), face, len(doubled) + place.reshape(-1))
+    others = edge_keys(halfedge_ends(F[single]), n)
+    others = others[np.isin(others, edges)]
+    uses = np.bincount(np.searchsorted(edges, others), minlength=len(edges))
+    part = label[len(doubled) :]
+    whole = np.bincount(part, (uses > 0) & (uses % 2 == 0), count)
+    open_ = np.bincount(part, uses % 2, count)
+    return doubled[(whole > open_)[label[: len(doubled)]]]
 
 
 def weld_vertices(V: FloatArray, candidates: NDArray[Any]) -> IndexArray | None:

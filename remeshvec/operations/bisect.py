@@ -70,7 +70,7 @@ def _bisect(span, mesh, blocks, stage, factors, mask, done, left):
                     continue
                 h = 3 * f + i
                 is_inner = mesh.twin[h] != NONE
-                if not _owns_quad(mesh, h, owned):
+                if not (_owns_quad(mesh, h, owned) and _is_wanted_across(mesh, h, mask)):
                     left[k] += 1
                     continue
                 v = _next_dead(mesh.vertex_halfedge, 1, v, high)
@@ -99,6 +99,17 @@ def _owns_quad(mesh, h, owned):
         return False
     t = mesh.twin[h]
     return t == NONE or owns(owned, apex_of(mesh.origin, t))
+
+
+@inlined
+def _is_wanted_across(mesh, h, mask):
+    """Tell whether the face across wants the same split, if there is one.
+
+    If not, it is a needle with a longer edge, which goes first [Rivara 1984, section 3]. Otherwise two
+    needles would cut one another's shorter edges, until vertices meet in one place.
+    """
+    t = mesh.twin[h]
+    return t == NONE or (mask[t // 3] >> (t % 3)) & 1 == 1
 
 
 @inlined

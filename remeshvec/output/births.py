@@ -74,6 +74,12 @@ def _on_input(p: Provenance, face: NDArray[np.integer], weights: FloatArray) -> 
         is_flipped = p.flipped[source]
         weights = weights.copy()
         weights[is_flipped] = weights[is_flipped][:, [0, 2, 1]]
+    if p.cuts is not None:
+        row = p.cuts.row[face]
+        is_cut = row != NONE
+        weights = weights.copy()
+        parts = p.cuts.weights[row[is_cut]]
+        weights[is_cut] = np.einsum("...i,...ij->...j", weights[is_cut], parts)
     return source, weights
 
 

@@ -306,6 +306,7 @@ def _provenance(
         prepared.face_source,
         prepared.vertex_source,
         prepared.flipped,
+        prepared.cuts,
         prepared.representative,
         n_in,
         trust,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..core.lazy import Lazy
 from ..core.vocabulary import BoolArray, FloatArray, IndexArray, Mesh
+from ..input.prepare import FaceCuts
 from ..reference.surface import Reference
 
 __all__ = ["Births", "Provenance"]
@@ -30,6 +31,7 @@ class Provenance(NamedTuple):
     face_source: NDArray[Any]  # faces of the reference in the input
     vertex_source: IndexArray  # vertices of the reference in the input
     flipped: BoolArray | None  # faces of the input whose corners 1 and 2 were swapped
+    cuts: FaceCuts | None  # faces of the reference that are parts of input faces
     representative: IndexArray | None  # the vertex that stands for each of the input; None: itself
     n_in: int
     trust: float

@@ -44,7 +44,12 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
         constraints = make_constraints(len(vertices), faces, options)
     with compile_notice(), thread_scope(recipe.threads) as may_run_parallel:
         with watch.time("build"):
-            prepared = prepare(vertices, faces, may_run_parallel and is_large(len(faces)))
+            prepared = prepare(
+                vertices,
+                faces,
+                may_run_parallel and is_large(len(faces)),
+                partial(constraints.kept, len(vertices)),
+            )
         monitor = Monitor(watch, options.callback)
         job = Job(prepared, constraints, vertices, sizing, recipe, monitor, may_run_parallel)
         del prepared  # it holds the mesh of the input

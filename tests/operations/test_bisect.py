@@ -86,6 +86,20 @@ def test_each_split_leaves_a_whole_mesh(name):
     assert zoo.area(mesh.X[:, :3], faces_of(mesh)) == pytest.approx(area)
 
 
+def test_the_longest_edge_of_both_faces_goes_first():
+    """The first needle wants the edge that they share, the second one a longer edge of its own.
+
+    Were needles to cut one another's shorter edges, vertices would meet in one place.
+    """
+    V = np.array([[0, 0, 0], [9.0, 0.05, 0], [10.0, 0, 0], [4.5, 0.1, 0]])
+    F = np.array([[0, 1, 3], [0, 2, 1]])
+    mesh = with_room(built(V, F), 2, 1, np.random.default_rng(0))
+    mesh.X[:, 3] = 1.0
+    assert bisect(mesh, one_block(mesh))[0] == 1
+    X = mesh.X[mesh.vertex_halfedge != DEAD, :3]
+    assert (X == [5.0, 0, 0]).all(axis=1).any()
+
+
 def test_a_split_is_that_of_the_twin():
     """Inside and on the boundary; the longest edge is the only one that is too long."""
     for name in ("square", "tetrahedron", "planar_delaunay", "annulus"):
