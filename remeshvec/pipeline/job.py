@@ -17,9 +17,10 @@ from ..input.recipe import Recipe
 from ..reference.build import FeaturedReference, build_reference
 from ..sizing.adaptive import Adaptive
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
-from ..sweeps.deviation import DeviationGuard
+from ..sweeps.deviation import DeviationCheck
 from ..sweeps.finish import finish, has_finish, measure_deviation
-from ..sweeps.guard import Guard
+from ..sweeps.flaws import CrossingCheck, FoldCheck, has_new_flaws
+from ..sweeps.guard import Check, Guard, HoldingGuard
 from ..sweeps.loop import Stop, run_sweeps
 from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Adaptation, Plan, make_schedule
@@ -108,15 +109,15 @@ class Job:
         monitor = self.monitor
         with monitor.watch.time("reference"):
             featured, length = self._build_reference(meshes[0], L)
-        monitor.counts = []
-        work = Work(meshes.pop(), featured, self.plan, monitor, self.may_run_parallel)
-        guard = Guard()
-        if self.plan.max_deviation is not None:
-            guard = DeviationGuard(featured, self.plan.max_deviation, work.is_parallel)
-        stop = run_sweeps(work, make_schedule(self.recipe), guard)
+        before = meshes[0].copy()
+        work, stop = self._guarded(meshes.pop(), featured, ())
+        n_flaws = 0 if monitor.is_cancelled else has_new_flaws(before, work.mesh)
+        if n_flaws:
+            checks = FoldCheck(), CrossingCheck(self.parallel)
+            other, other_stop = self._guarded(before.copy(), featured, checks)
+            if has_new_flaws(before, other.mesh) < n_flaws:
+                work, stop = other, other_stop
         is_compact = has_finish(work)
-        if is_compact:
-            finish(work, guard)
         return Remeshed(
             work.mesh,
             is_compact,
@@ -124,8 +125,23 @@ class Job:
             length / self.prepared.scale,
             monitor.counts,
             _in_words(stop, self.recipe.tol),
-            measure_deviation(work, guard),
+            measure_deviation(work),
         )
+
+    def _guarded(
+        self, mesh: Mesh, featured: FeaturedReference, checks: tuple[Check, ...]
+    ) -> tuple[Work, Stop]:
+        """Sweep over a mesh and finish it, with a guard that makes these checks."""
+        self.monitor.counts = []
+        work = Work(mesh, featured, self.plan, self.monitor, self.may_run_parallel)
+        bound = self.plan.max_deviation
+        if bound is not None:
+            checks = (DeviationCheck(featured, bound, work.is_parallel), *checks)
+        guard = HoldingGuard(checks, work.is_parallel) if checks else Guard()
+        stop = run_sweeps(work, make_schedule(self.recipe), guard)
+        if has_finish(work):
+            finish(work, guard)
+        return work, stop
 
     def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
         """Set the lengths of a mesh, mark its features, build the reference."""

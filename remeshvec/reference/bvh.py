@@ -19,6 +19,8 @@ from ..core.vocabulary import NONE, FloatArray, IndexArray, Tree
 from ..mesh.walk import next_halfedge, previous_halfedge
 
 __all__ = [
+    "ARITY",
+    "LEAF",
     "NO_NORMAL",
     "STACK",
     "WALK_TRUST",
@@ -35,8 +37,8 @@ __all__ = [
     "walk_to_face",
 ]
 
-_LEAF = 4  # faces in a leaf
-_ARITY = 4  # boxes in a node
+LEAF = 4  # faces in a leaf
+ARITY = 4  # boxes in a node
 _WALK = 64  # steps of a walk
 _FAN = 32  # faces around a corner that one step looks at
 _POINTS = 256  # points that follow each other in one query
@@ -123,9 +125,9 @@ def build_tree(
     patch : (m,) int32
         Patch of every face: what walks can reach.
     """
-    counts = [-(-len(F) // _LEAF)]
+    counts = [-(-len(F) // LEAF)]
     while counts[-1] > 1:
-        counts.append(-(-counts[-1] // _ARITY))
+        counts.append(-(-counts[-1] // ARITY))
     level = np.zeros(len(counts) + 1, np.int64)
     level[1:] = np.cumsum(counts)
     corners = np.empty((len(F), 9))
@@ -136,13 +138,13 @@ def build_tree(
     return Tree(corners, twin, patch, boxes, level)
 
 
-@threaded(lambda X, F, *_: -(-len(F) // _LEAF))
+@threaded(lambda X, F, *_: -(-len(F) // LEAF))
 def _fill_leaves(span, X, F, corners, boxes):
     for leaf in range(span[0], span[1]):
         for i in range(3):
             boxes[leaf, i] = np.inf
             boxes[leaf, 3 + i] = -np.inf
-        for f in range(_LEAF * leaf, min(_LEAF * leaf + _LEAF, F.shape[0])):
+        for f in range(LEAF * leaf, min(LEAF * leaf + LEAF, F.shape[0])):
             for c in range(3):
                 for i in range(3):
                     x = X[F[f, c], i]
@@ -153,7 +155,7 @@ def _fill_leaves(span, X, F, corners, boxes):
 
 def _fill_level(boxes: FloatArray, below: int, start: int, end: int) -> None:
     """Boxes of one level as unions of the level below."""
-    groups = np.arange(below, start, _ARITY)
+    groups = np.arange(below, start, ARITY)
     boxes[start:end, :3] = np.minimum.reduceat(boxes[:start, :3], groups, axis=0)
     boxes[start:end, 3:] = np.maximum.reduceat(boxes[:start, 3:], groups, axis=0)
 
@@ -272,15 +274,15 @@ def search_face(tree, p, face, normal, stack):
         i = stack[0, size]
         d = stack[1, size]
         if d == 0:
-            for f in range(_LEAF * i, min(_LEAF * i + _LEAF, tree.corners.shape[0])):
+            for f in range(LEAF * i, min(LEAF * i + LEAF, tree.corners.shape[0])):
                 if f != seen and tree.patch[f] == patch:
                     fs, ft, fd = face_distance(tree.corners, f, p)
                     if fd < distance and not _looks_away(tree.corners, f, normal):
                         best, s, t, distance = f, fs, ft, fd
             continue
         start = tree.level[d - 1]
-        end = min(start + _ARITY * i + _ARITY, tree.level[d])
-        for j in range(start + _ARITY * i, end):
+        end = min(start + ARITY * i + ARITY, tree.level[d])
+        for j in range(start + ARITY * i, end):
             if _box_distance(tree.boxes, j, p) < distance:
                 stack[0, size] = j - start
                 stack[1, size] = d - 1

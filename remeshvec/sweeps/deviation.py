@@ -1,24 +1,15 @@
-"""The guard of `max_deviation`: samples of both surfaces, and what to hold where they lie too far apart.
-
-Samples of the new mesh must lie near the input, samples of the input near the new mesh. Around those that
-do not, vertices and edges of the mesh before the sweep are held, and the sweep is run again.
-"""
+"""The check of `max_deviation`: samples of the new mesh must lie near the input, and the other way."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.vocabulary import (
-    CURVE,
     DEAD,
     FROZEN,
-    HALTED,
     HELD,
-    INNER,
     NON_MANIFOLD,
     NONE,
-    PINNED,
     FloatArray,
     IndexArray,
     Mesh,
@@ -26,10 +17,10 @@ from ..core.vocabulary import (
 )
 from ..features.polyline import find_siblings
 from ..reference.build import FeaturedReference
-from ..reference.bvh import build_tree, closest_faces
-from .guard import HoldingGuard
+from ..reference.bvh import closest_faces
+from .guard import tree_of
 
-__all__ = ["DeviationGuard", "edges_to_refine", "sample_mesh", "shortened_lengths"]
+__all__ = ["DeviationCheck", "edges_to_refine", "sample_mesh", "shortened_lengths"]
 
 # Samples of a face lie on a grid of so many steps along every side.
 _STEPS = 5
@@ -55,12 +46,12 @@ def sample_mesh(X: FloatArray, F: IndexArray) -> tuple[FloatArray, IndexArray]:
     return points, np.repeat(np.arange(len(F), dtype=np.int32), len(_GRID))
 
 
-class DeviationGuard(HoldingGuard):
-    """Compares meshes with the input, and holds what would lead too far from it.
+class DeviationCheck:
+    """Samples of both surfaces that lie too far from the other one.
 
     Parameters
     ----------
-    built : Built
+    featured : FeaturedReference
     distance : float
         Largest deviation, in the frame of the meshes.
     parallel : bool
@@ -72,15 +63,13 @@ class DeviationGuard(HoldingGuard):
         self.parallel = parallel
         F = self.reference.origin.reshape(-1, 3)
         self.samples, _ = sample_mesh(self.reference.X, F)
-        self.before: Tree | None = None
-        self.held = np.zeros(0, np.bool_)
 
-    def remember(self, mesh: Mesh) -> None:
-        """Build the tree of a compact mesh before it is changed."""
-        self.before = _tree_of(mesh, self.parallel)
-        self.held = np.zeros(len(mesh.X), np.bool_)
+    def remember(self, mesh: Mesh, tree: Tree) -> None:
+        """Nothing: a mesh is compared with the input."""
 
-    def distances(self, mesh: Mesh, trust: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def distances(
+        self, mesh: Mesh, tree: Tree, trust: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distances of samples: of the mesh from the input, and of the input from the mesh.
 
         Returns
@@ -97,43 +86,20 @@ class DeviationGuard(HoldingGuard):
         points, face = sample_mesh(mesh.X, F)
         hint = _hints(mesh, F, mesh.source[alive])[face]
         _, to_input = closest_faces(self.reference.tree, points, hint, trust, self.parallel)
-        tree = _tree_of(mesh, self.parallel)
         anywhere = np.full(len(self.samples), NONE, np.int32)
         _, from_input = closest_faces(tree, self.samples, anywhere, trust, self.parallel)
         return points, to_input, from_input
 
-    def offenders(self, mesh: Mesh) -> FloatArray:
+    def offenders(self, mesh: Mesh, tree: Tree) -> FloatArray:
         """Return the samples of either surface that lie too far from the other, (k, 3)."""
         limit = _SAMPLED_SHARE * self.distance
-        points, to_input, from_input = self.distances(mesh, limit)
+        points, to_input, from_input = self.distances(mesh, tree, limit)
         return np.concatenate([points[to_input > limit], self.samples[from_input > limit]])
-
-    def hold(self, mesh: Mesh, offenders: FloatArray, attempt: int) -> None:
-        """Hold the mesh that was remembered around points, and as many rings of faces more."""
-        assert self.before is not None
-        anywhere = np.full(len(offenders), NONE, np.int32)
-        faces, _ = closest_faces(self.before, offenders, anywhere, 0.0, self.parallel)
-        F = mesh.origin.reshape(-1, 3)
-        is_held = np.zeros(len(mesh.X), np.bool_)
-        is_held[F[faces]] = True
-        for _ in range(attempt):
-            is_held[F[is_held[F].any(axis=1)]] = True
-        _agree_across_sheets(mesh, is_held)
-        inner, on_curve = is_held & (mesh.kind == INNER), is_held & (mesh.kind == CURVE)
-        mesh.kind[inner], mesh.kind[on_curve] = HELD, PINNED
-        self.held[inner | on_curve] = True
-        ends = is_held[mesh.origin] & is_held[F[:, [1, 2, 0]].ravel()]
-        mesh.curve[ends & (mesh.curve == NONE)] = HALTED
-
-    def release(self, mesh: Mesh) -> None:
-        """Let go of what was held for a sweep, after it."""
-        mesh.kind[self.held & (mesh.kind == HELD)] = INNER
-        mesh.kind[self.held & (mesh.kind == PINNED)] = CURVE
-        mesh.curve[mesh.curve == HALTED] = NONE
 
     def measure(self, mesh: Mesh) -> dict[str, float]:
         """Largest distance of a sample, each way."""
-        _, to_input, from_input = self.distances(mesh, 0.0)
+        tree = tree_of(mesh, self.parallel)
+        _, to_input, from_input = self.distances(mesh, tree, 0.0)
         return {"to_input": float(to_input.max()), "from_input": float(from_input.max())}
 
 
@@ -158,7 +124,7 @@ def shortened_lengths(
     worst = _worst_distances(mesh, featured, tolerance, parallel)
     X = featured.reference.X
     anywhere = np.full(len(X), NONE, np.int32)
-    face, _ = closest_faces(_tree_of(mesh, parallel), X[:, :3], anywhere, 0.0, parallel)
+    face, _ = closest_faces(tree_of(mesh, parallel), X[:, :3], anywhere, 0.0, parallel)
     share = tolerance / np.maximum(worst[face], tolerance)
     return np.asarray(X[:, 3] * np.maximum(np.sqrt(share), 0.7))
 
@@ -193,15 +159,6 @@ def edges_to_refine(
     return edges.astype(np.int32)
 
 
-def _tree_of(mesh: Mesh, parallel: bool) -> Tree:
-    alive = mesh.origin[::3] != DEAD
-    F = mesh.origin.reshape(-1, 3)[alive]
-    new = np.cumsum(alive) - 1
-    twin = mesh.twin.reshape(-1, 3)[alive].ravel()
-    twin = np.where(twin == NONE, NONE, 3 * new[twin // 3] + twin % 3).astype(np.int32)
-    return build_tree(mesh.X, F, twin, np.zeros(len(F), np.int32), parallel)
-
-
 def _hints(mesh: Mesh, F: IndexArray, source: IndexArray) -> IndexArray:
     """Faces of the reference to start at: where an inner corner was born, or any of the patch."""
     hint = source.copy()
@@ -209,14 +166,3 @@ def _hints(mesh: Mesh, F: IndexArray, source: IndexArray) -> IndexArray:
         v = F[:, corner]
         hint = np.where(mesh.kind[v] <= HELD, mesh.birth[v] // 3, hint)
     return hint.astype(np.int32)
-
-
-def _agree_across_sheets(mesh: Mesh, is_held: NDArray[np.bool_]) -> None:
-    """Hold all vertices that lie where a held one lies on a boundary: sheets may share it."""
-    h = np.flatnonzero(mesh.twin == NONE)
-    border = np.unique(mesh.origin[h])
-    if len(border):
-        _, place = np.unique(mesh.X[border, :3], axis=0, return_inverse=True)
-        held = np.zeros(len(border), np.bool_)
-        held[place.reshape(-1)[is_held[border]]] = True
-        is_held[border] = held[place.reshape(-1)]

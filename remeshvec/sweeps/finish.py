@@ -16,7 +16,7 @@ from ..operations.untangle import approach_vertices, untangle_vertices
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_copies
 from ..sizing.target_lengths import bound_gradation
-from .deviation import DeviationGuard, edges_to_refine
+from .deviation import DeviationCheck, edges_to_refine
 from .guard import Guard
 from .sheets import separate_sheets
 from .work import Work
@@ -127,12 +127,14 @@ def refine(work: Work) -> None:
         flip_edges(work.mesh, work.blocks, flips, parallel)
 
 
-def measure_deviation(work: Work, guard: Guard) -> dict[str, float]:
+def measure_deviation(work: Work) -> dict[str, float]:
     """Measure how far the two surfaces are apart, in the caller's units, where a bound was asked for."""
     plan = work.plan
-    if not isinstance(guard, DeviationGuard):
+    bound = plan.max_deviation
+    if bound is None:
         if plan.adaptation is None:
             return {}
-        guard = DeviationGuard(work.featured, plan.adaptation.tolerance, work.is_parallel)
+        bound = plan.adaptation.tolerance
     with work.monitor.watch.time("deviation"):
-        return {way: d / plan.scale for way, d in guard.measure(work.mesh).items()}
+        check = DeviationCheck(work.featured, bound, work.is_parallel)
+        return {way: d / plan.scale for way, d in check.measure(work.mesh).items()}

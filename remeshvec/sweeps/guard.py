@@ -1,22 +1,46 @@
 """Guards of a sweep: what follows the splits is tried on a copy, and tried again with more of it held.
 
-So no phase needs to know what must not happen, whichever of them would do it.
+So no phase needs to know what must not happen, whichever of them would do it. What must not happen is
+said by checks: each remembers a mesh, and names places where a later mesh is not as it should be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 
-from ..core.vocabulary import Mesh
+from ..core.vocabulary import (
+    CURVE,
+    DEAD,
+    HALTED,
+    HELD,
+    INNER,
+    NONE,
+    PINNED,
+    BoolArray,
+    FloatArray,
+    Mesh,
+    Tree,
+)
+from ..reference.bvh import build_tree, closest_faces
 from .work import Work
 
-__all__ = ["Guard", "HoldingGuard"]
+__all__ = ["Check", "Guard", "HoldingGuard", "tree_of"]
 
 # Times that a sweep is tried, with more of the mesh held each time, before it is left out.
 _ATTEMPTS = 8
+
+
+class Check(Protocol):
+    """Says where a mesh is worse than an earlier one, or than it may be."""
+
+    def remember(self, mesh: Mesh, tree: Tree) -> None:
+        """Take in a compact mesh, and the tree over its faces, before it is changed."""
+
+    def offenders(self, mesh: Mesh, tree: Tree) -> FloatArray:
+        """Return the places (k, 3) where the changed mesh is not good; the tree is over its faces."""
 
 
 class Guard:
@@ -28,47 +52,92 @@ class Guard:
 
 
 class HoldingGuard(Guard):
-    """Changes copies of a mesh until one is good; subclasses say what is good, and what to hold."""
+    """Changes copies of a mesh until one is good; holds the mesh before where a check says so.
 
-    def remember(self, mesh: Mesh) -> None:
-        """Take in a compact mesh before it is changed."""
-        raise NotImplementedError
+    Parameters
+    ----------
+    checks : sequence of Check
+    parallel : bool
+    """
 
-    def offenders(self, mesh: Mesh) -> Any:
-        """Return what is wrong with a changed mesh; nothing where its length is 0."""
-        raise NotImplementedError
-
-    def hold(self, mesh: Mesh, offenders: Any, attempt: int) -> None:
-        """Hold the mesh before the change where offenders came from it, more so in later attempts."""
-        raise NotImplementedError
-
-    def release(self, mesh: Mesh) -> None:
-        """Let go of all that was held since the mesh was remembered."""
-        raise NotImplementedError
+    def __init__(self, checks: Sequence[Check], parallel: bool) -> None:
+        self.checks = checks
+        self.parallel = parallel
 
     def attempts(self, work: Work, is_compact: bool = False) -> Iterator[Work]:
         """Yield copies of the work; the first good one becomes the work, which else stays as it is."""
         monitor = work.monitor
         if not is_compact:
             work.compact()
-        with monitor.watch.time("deviation"):
-            self.remember(work.mesh)
+        with monitor.watch.time("guard"):
+            tree = tree_of(work.mesh, self.parallel)
+            for check in self.checks:
+                check.remember(work.mesh, tree)
+        held = np.zeros(len(work.mesh.X), np.bool_)
         counts = dict(monitor.counts[-1])
         for attempt in range(_ATTEMPTS):
             monitor.counts[-1] = dict(counts)
             trial = work.trial()
             yield trial
-            with monitor.watch.time("deviation"):
-                offenders = self.offenders(trial.mesh)
+            with monitor.watch.time("guard"):
+                offenders = self._offenders(trial.mesh)
                 if not len(offenders):
-                    self.release(trial.mesh)
+                    _release(trial.mesh, held)
                     work.adopt(trial)
                     return
                 if monitor.is_cancelled:
                     break
-                self.hold(work.mesh, offenders, attempt)
-        self.release(work.mesh)
+                held |= self._hold(work.mesh, tree, offenders, attempt)
+        _release(work.mesh, held)
         work.step = np.inf
         monitor.counts[-1] = counts | {
             name: 0 for name in ("collapse", "flip") if name not in counts
         }
+
+    def _offenders(self, mesh: Mesh) -> FloatArray:
+        tree = tree_of(mesh, self.parallel)
+        return np.concatenate([check.offenders(mesh, tree) for check in self.checks])
+
+    def _hold(self, mesh: Mesh, tree: Tree, offenders: FloatArray, attempt: int) -> BoolArray:
+        """Hold a compact mesh around points, and as many rings of faces more; returns what is new."""
+        anywhere = np.full(len(offenders), NONE, np.int32)
+        faces, _ = closest_faces(tree, offenders, anywhere, 0.0, self.parallel)
+        F = mesh.origin.reshape(-1, 3)
+        is_held = np.zeros(len(mesh.X), np.bool_)
+        is_held[F[faces]] = True
+        for _ in range(attempt):
+            is_held[F[is_held[F].any(axis=1)]] = True
+        _agree_across_sheets(mesh, is_held)
+        inner, on_curve = is_held & (mesh.kind == INNER), is_held & (mesh.kind == CURVE)
+        mesh.kind[inner], mesh.kind[on_curve] = HELD, PINNED
+        ends = is_held[mesh.origin] & is_held[F[:, [1, 2, 0]].ravel()]
+        mesh.curve[ends & (mesh.curve == NONE)] = HALTED
+        return np.asarray(inner | on_curve)
+
+
+def _release(mesh: Mesh, held: BoolArray) -> None:
+    """Let go of what was held for a sweep; the mesh may have lost some of it."""
+    mesh.kind[held & (mesh.kind == HELD)] = INNER
+    mesh.kind[held & (mesh.kind == PINNED)] = CURVE
+    mesh.curve[mesh.curve == HALTED] = NONE
+
+
+def tree_of(mesh: Mesh, parallel: bool) -> Tree:
+    """Build a tree over the faces of a mesh that are left, as one patch."""
+    alive = mesh.origin[::3] != DEAD
+    F = mesh.origin.reshape(-1, 3)[alive]
+    new = np.cumsum(alive) - 1
+    twin = mesh.twin.reshape(-1, 3)[alive].ravel()
+    twin = np.where(twin == NONE, NONE, 3 * new[twin // 3] + twin % 3).astype(np.int32)
+    return build_tree(mesh.X, F, twin, np.zeros(len(F), np.int32), parallel)
+
+
+def _agree_across_sheets(mesh: Mesh, is_held: BoolArray) -> None:
+    """Hold all vertices that lie where a held one lies on a boundary: sheets may share it."""
+    h = np.flatnonzero(mesh.twin == NONE)
+    border = np.unique(mesh.origin[h])
+    if len(border):
+        _, place = np.unique(mesh.X[border, :3], axis=0, return_inverse=True)
+        held = np.zeros(len(border), np.bool_)
+        held[place.reshape(-1)[is_held[border]]] = True
+        is_held[border] = held[place.reshape(-1)]
