@@ -18,19 +18,20 @@ __all__ = ["crossing_faces"]
 _APART = 1e-13
 
 
-def crossing_faces(tree: Tree, parallel: bool) -> IndexArray:
+def crossing_faces(tree: Tree, parallel: bool, adjacent: bool = True) -> IndexArray:
     """Return the faces that an edge of another face passes through, or whose edges do, in order.
 
-    Faces that touch, or lie in one plane, do not cross. Two faces that share corners cross where they
-    meet elsewhere too [Moeller 1997; here by signed volumes].
+    Faces that touch, or lie in one plane, do not cross. Two faces that share a corner cross where they
+    meet elsewhere too [Moeller 1997; here by signed volumes]; without ``adjacent``, only faces that
+    share none are looked at, in a third of the time.
     """
     marks = np.zeros(len(tree.corners), np.uint8)
-    _find_crossings(parallel, tree, marks)
+    _find_crossings(parallel, tree, adjacent, marks)
     return np.flatnonzero(marks).astype(np.int32)
 
 
-@threaded(lambda tree, marks: -(-marks.size // LEAF))
-def _find_crossings(span, tree, marks):
+@threaded(lambda tree, adjacent, marks: -(-marks.size // LEAF))
+def _find_crossings(span, tree, adjacent, marks):
     """Mark the faces of the leaves in a span, and the later ones that they cross.
 
     Pieces may mark the same face, with the same value.
@@ -38,11 +39,11 @@ def _find_crossings(span, tree, marks):
     for leaf in range(span[0], span[1]):
         stack = np.empty((2, STACK), np.int64)
         for f in range(LEAF * leaf, min(LEAF * leaf + LEAF, marks.size)):
-            _mark_crossed(tree, f, stack, marks)
+            _mark_crossed(tree, f, adjacent, stack, marks)
 
 
 @inlined
-def _mark_crossed(tree, f, stack, marks):
+def _mark_crossed(tree, f, adjacent, stack, marks):
     """Mark a face and the later ones that it crosses, if there are any."""
     low, high = _box_of(tree.corners, f)
     stack[0, 0] = 0
@@ -54,7 +55,9 @@ def _mark_crossed(tree, f, stack, marks):
         d = stack[1, size]
         if d == 0:
             for g in range(LEAF * i, min(LEAF * i + LEAF, tree.corners.shape[0])):
-                if g > f and _meets(tree.corners, g, low, high) and _cross(tree.corners, f, g):
+                if g <= f or not _meets(tree.corners, g, low, high):
+                    continue
+                if _cross(tree.corners, f, g, adjacent):
                     marks[f] = 1
                     marks[g] = 1
             continue
@@ -107,9 +110,22 @@ def _box_meets(boxes, j, low, high):
 
 
 @inlined
-def _cross(corners, f, g):
+def _cross(corners, f, g, adjacent):
     """Tell whether two faces cross: an edge of one, off all common corners, passes through the other."""
+    common = _count_common(corners, f, g)
+    if common > 1 or (common == 1 and not adjacent):
+        return False
     return _pierces(corners, f, g) or _pierces(corners, g, f)
+
+
+@inlined
+def _count_common(corners, f, g):
+    """Count the corners of a face that another one shares."""
+    a, b, c = corner(corners, g, 0), corner(corners, g, 1), corner(corners, g, 2)
+    count = 0
+    for i in range(3):
+        count += _is_corner(corner(corners, f, i), a, b, c)
+    return count
 
 
 @inlined

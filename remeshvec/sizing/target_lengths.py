@@ -97,13 +97,16 @@ def bound_gradation(
     one place get the same length, or the sheets would part.
 
     They are on the surface of the input already; an edge may take a short cut there. At edges that
-    must stay lengths are what these ask for.
+    must stay lengths are what these ask for, on all sheets: were one of them shorter, the splits
+    beside such an edge would never end.
     """
     h = np.flatnonzero(mesh.origin != DEAD)
     a, b = ends_of(mesh.origin, h)
     frozen = np.zeros(len(mesh.X), np.bool_)
     frozen[a[mesh.curve[h] == FROZEN]] = True
     frozen[b[mesh.curve[h] == FROZEN]] = True
+    if copies is not None:
+        copies = _free_copies(frozen, *copies)
     free = ~(frozen[a] | frozen[b])
     a, b = a[free], b[free]
     lengths = mesh.X[:, 3]
@@ -119,6 +122,17 @@ def bound_gradation(
             shared = np.full(int(place.max()) + 1, np.inf)
             np.minimum.at(shared, place, lengths[v])
             lengths[v] = shared[place]
+
+
+def _free_copies(
+    frozen: BoolArray, v: IndexArray, place: IndexArray
+) -> tuple[IndexArray, IndexArray] | None:
+    """Mark all copies of marked vertices; returns the others, None for none."""
+    is_frozen = np.zeros(int(place.max()) + 1, np.bool_)
+    is_frozen[place[frozen[v]]] = True
+    frozen[v] |= is_frozen[place]
+    free = ~is_frozen[place]
+    return (v[free], place[free]) if free.any() else None
 
 
 def check_gradation(value: Any) -> float:
