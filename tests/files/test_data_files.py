@@ -1,9 +1,12 @@
 """Files of every kind come back remeshed with what they carried, or say what they cannot hold."""
 
 import json
+from contextlib import suppress
+from time import perf_counter
 
 import numpy as np
 import pytest
+from helpers.hostile_files import LEGAL, OBJ
 
 from data.shapes import textured
 from remeshvec import MeshFormatError, read_mesh
@@ -225,6 +228,51 @@ def test_obj_with_data_has_the_faces_of_the_mesh(tmp_path, change):
     assert np.array_equal(data.F, read_mesh(path).F) and data.F.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert data.on_corners["uv"][0].tolist() == [[0, 0], [1, 0], [1, 1]]
     assert data.on_faces["material"].tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("name", LEGAL)
+def test_both_readers_find_the_same_mesh(name, tmp_path):
+    (tmp_path / name).write_bytes(LEGAL[name])
+    data, notices = read_data(tmp_path / name)
+    mesh = read_mesh(tmp_path / name)
+    assert np.array_equal(data.V, mesh.V) and np.array_equal(data.F, mesh.F)
+    assert notices == mesh.notices
+
+
+@pytest.mark.parametrize("line", ["f\u00a01 2 3", "F 1 2 3", "fo 1 2 3", "f1 2 3"])
+def test_lines_without_a_known_keyword_are_named(line, tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_bytes(OBJ + f"{line}\nl 1 2\ncstype bezier\nnonsense\n".encode())
+    for notices in (read_data(path)[1], read_mesh(path).notices):
+        assert len(notices) == 1 and notices[0].startswith("2 lines without a keyword of OBJ")
+        assert line[0] in notices[0]
+
+
+@pytest.mark.parametrize(
+    "name", ["a\nf 1 2 3", "a\rf 1 2 3", "a\\", "a \\ \\\t", "a # b", "a\u2028f 1 2 3", "", "\n"]
+)
+def test_no_name_changes_what_is_written(name, tmp_path):
+    data = loaded_cube()
+    data.extra |= {"group": [name, "upper half"], "mtllib": [str(tmp_path / name / "a.mtl")]}
+    write_data(tmp_path / "a.obj", data)
+    for F in (read_data(tmp_path / "a.obj")[0].F, read_mesh(tmp_path / "a.obj").F):
+        assert np.array_equal(F, data.F)
+
+
+def test_the_time_to_read_obj_is_linear(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_bytes(OBJ + b"".join(b"g %d\nf 1 2 3\n" % i for i in range(60_000)))
+    start = perf_counter()
+    assert len(read_data(path)[0].extra["group"]) == 60_000
+    digits = b"1" * 300_000
+    for old, new in [
+        (b"v 1", b"v " + digits), (b"v 1", b"v " + digits + b"x"), (b"v 1", b"v 0." + digits),
+        (b"f 1", b"f 1/" + digits), (b"f 1", b"f 1" + b"/" * 300_000), (b"v 1", b"\\ " * 150_000),
+    ]:  # fmt: skip
+        path.write_bytes(OBJ.replace(old, new))
+        with suppress(MeshFormatError):
+            read_data(path)
+    assert perf_counter() - start < 5
 
 
 @pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".xdmf", ".msh", ".vtp"])
