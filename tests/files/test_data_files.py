@@ -1,6 +1,7 @@
 """Files of every kind come back remeshed with what they carried, or say what they cannot hold."""
 
 import json
+import os
 from contextlib import suppress
 from time import perf_counter
 
@@ -11,6 +12,7 @@ from helpers.hostile_files import LEGAL, OBJ
 from data.shapes import textured
 from remeshvec import MeshFormatError, read_mesh
 from remeshvec.batch.one_file import remesh_file
+from remeshvec.files import foreign
 from remeshvec.files.data_files import read_data, write_data
 from remeshvec.interop.mesh_data import MeshData
 
@@ -375,6 +377,42 @@ def test_broken_files_end_with_our_exception(tmp_path, suffix):
     with pytest.raises(MeshFormatError, match="folder"):
         (tmp_path / f"d{suffix}").mkdir()
         read_data(tmp_path / f"d{suffix}")
+
+
+def test_a_reader_that_never_ends_is_ended(tmp_path, monkeypatch):
+    pytest.importorskip("meshio")
+    path = tmp_path / "endless.bdf"
+    path.write_text("SOL 101\nCEND\nBEGIN BULK\n")
+    monkeypatch.setattr(foreign, "_SECONDS", 0.2)
+    with pytest.raises(MeshFormatError, match=r"cannot read .*endless\.bdf: it took longer"):
+        read_data(path)
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".bdf", ".vtp", ".glb"])
+def test_pipes_and_devices_are_refused(tmp_path, suffix):
+    os.mkfifo(tmp_path / f"pipe{suffix}")
+    (tmp_path / f"zero{suffix}").symlink_to("/dev/zero")
+    for name in ("pipe", "zero"):
+        with pytest.raises(MeshFormatError, match="regular file"):
+            read_data(tmp_path / f"{name}{suffix}")
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtp", ".glb"])
+def test_nothing_is_lost_between_processes(tmp_path, suffix):
+    library = {".vtp": "pyvista", ".glb": "trimesh"}.get(suffix, "meshio")
+    pytest.importorskip(library)
+    path = tmp_path / f"a{suffix}"
+    write_data(path, loaded_cube())
+    here, notices = foreign._read_here((library, path), None)
+    data, others = read_data(path)
+    assert others == notices and data.feature_data == here.feature_data
+    for name in ("on_vertices", "on_faces", "on_corners"):
+        there, known = getattr(data, name), getattr(here, name)
+        assert list(there) == list(known)
+        for key, values in known.items():
+            assert there[key].dtype == values.dtype and np.array_equal(there[key], values)
+    assert data.V.dtype == here.V.dtype and np.array_equal(data.V, here.V)
+    assert data.F.dtype == here.F.dtype and np.array_equal(data.F, here.F)
 
 
 def test_unknown_suffixes_are_named(tmp_path):
