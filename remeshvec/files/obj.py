@@ -130,7 +130,7 @@ class ObjFile:
             data.on_vertices["color"] = self._vertices[:, 3:6].copy()
         if len(self._at("mtllib")):
             names = [_decoded(operand) for operand in self._operands("mtllib")]
-            data.extra["mtllib"] = [str((folder / name).resolve()) for name in names]
+            data.extra["mtllib"] = [os.path.realpath(folder / name) for name in names]
         return data
 
     def _texture_coordinates(self) -> FloatArray | None:
@@ -261,6 +261,6 @@ def _in_line(name: str) -> str:
 
 def _relative(target: str, path: Path) -> str:
     try:
-        return Path(os.path.relpath(target, path.resolve().parent)).as_posix()
+        return Path(os.path.relpath(target, os.path.dirname(os.path.realpath(path)))).as_posix()
     except ValueError:  # on another drive
         return target
