@@ -95,7 +95,7 @@ def read_foreign(path: Path) -> tuple[MeshData, list[str]]:
         The library took too long, or its process died.
     """
     name, _ = _library(path.suffix.lower())
-    limit = _SECONDS + path.stat().st_size / _BYTES_PER_SECOND
+    limit = _SECONDS + path.stat().st_size // _BYTES_PER_SECOND
     return _reader((name, path.resolve()), limit)
 
 
