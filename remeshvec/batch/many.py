@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Sized
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ..core import arguments
 from ..core.threads import available_threads
 from ..errors import BatchError, OptionError
@@ -159,14 +161,21 @@ def _check_names(options: Iterable[str]) -> None:
 
 
 def _with_names(items: Iterator[Any], options: dict[str, Any], crew: _Crew) -> Iterator[BatchItem]:
-    """Remesh, and put back the names and arrays that the workers did not need."""
+    """Remesh, and put back the names and arrays that the workers did not need.
+
+    Items wait for their worker while the caller makes the next one, perhaps in the same arrays: they are
+    copied.
+    """
     held: dict[int, tuple[str, Any]] = {}  # name and arrays of the items at work
 
     def tasks() -> Iterator[Any]:
         for index, item in enumerate(items):
             mesh = _mesh_of(item)
-            held[index] = _item_name(item), mesh if _is_vertex_face_pair(mesh) else None
+            name, arrays = _item_name(item), None
             del item
+            if _is_vertex_face_pair(mesh) and not crew.is_here:
+                mesh = arrays = tuple(x.copy() if isinstance(x, np.ndarray) else x for x in mesh)
+            held[index] = name, arrays
             yield mesh
 
     for outcome in _item_outcomes(tasks(), options, crew):

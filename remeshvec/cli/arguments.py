@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from typing import Any, get_args
 
 from ..core.version import __version__
@@ -15,7 +16,7 @@ from ..input.options import OPTION_NAMES, Boundary, Preset
 from ..measures.quality import quality
 from ..sizing.adaptive import Adaptive
 
-__all__ = ["FILE_OPTIONS", "batch_parser", "given_options", "parser", "target_length"]
+__all__ = ["FILE_OPTIONS", "batch_parser", "given_options", "parse", "parser", "target_length"]
 
 
 EPILOG = """\
@@ -123,6 +124,15 @@ def batch_parser() -> argparse.ArgumentParser:
     _add_constraints(result.add_argument_group("what to keep"))
     _add_remesh_options(result.add_argument_group("how to remesh"))
     return result
+
+
+def parse(parser: argparse.ArgumentParser, words: Sequence[str]) -> argparse.Namespace:
+    """Parse arguments, none of which may be empty: most often a variable of a script was not set."""
+    options = parser.parse_args(words)
+    for name, value in vars(options).items():
+        if value == "" or (isinstance(value, list) and "" in value):
+            parser.error(f"argument {name.replace('_', '-')}: the name is empty")
+    return options
 
 
 def target_length(options: argparse.Namespace, mesh: MeshFile) -> Any:

@@ -52,7 +52,7 @@ def read_array(path: str, columns: int = 1, whole: bool = True) -> NDArray[np.ge
         if Path(path).suffix == ".npy":
             values = np.load(path, allow_pickle=False)
         else:
-            lines = Path(path).read_text().splitlines()
+            lines = Path(path).read_text(encoding="utf-8").split("\n")
             words = [w for line in lines for w in line.split("#")[0].replace(",", " ").split()]
             values = np.array([float(word) for word in words])
     except (OSError, ValueError, EOFError) as error:

@@ -25,7 +25,7 @@ from ..files.disk import check_writable, write_file
 from ..files.mesh_files import MeshFile
 from ..interop.mesh_data import carry
 from ..processes.pool import run_here, run_in_processes
-from .arguments import batch_parser, given_options, target_length
+from .arguments import batch_parser, given_options, parse, target_length
 from .batch_files import FileJob, find_jobs, refuse_collisions
 from .batch_table import COLUMNS, MEASURES, ResultTable, Row, write_parquet
 
@@ -50,7 +50,7 @@ _NOT_OPTIONS = (
 
 def parsed(words: Sequence[str]) -> argparse.Namespace:
     """Parse the arguments after ``batch``."""
-    return batch_parser().parse_args(words)
+    return parse(batch_parser(), words)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -2,6 +2,9 @@
 
 A row is appended in one write when a mesh is done, so a killed run loses at most its last row; an
 incomplete line at the end is dropped. The end of a run sorts the rows, one per mesh.
+
+A table that a spreadsheet has saved is read as well: with a byte order mark, other separators, quotes,
+and numbers in other forms. Numbers that were rounded make a mesh look changed: it is done again.
 """
 
 from __future__ import annotations
@@ -41,6 +44,7 @@ COLUMNS = (
     "options",
     "version",
 )
+_NUMBERS = tuple(name for name in COLUMNS if name not in _TEXT)
 
 Row = dict[str, Any]
 
@@ -54,7 +58,7 @@ class ResultTable:
         Raises
         ------
         OptionError
-            The file is not a table of a batch.
+            The file is not a table of a batch, or holds something else where numbers belong.
         MeshFormatError
             The file cannot be read.
         """
@@ -65,14 +69,28 @@ class ResultTable:
             content = Path(path).read_bytes() if os.path.exists(path) else b""
         except OSError as error:
             raise MeshFormatError(f"cannot read {path}: {error.strerror}") from error
-        self._parse(content[: content.rfind(b"\n") + 1].decode("utf-8", "surrogateescape"))
-        if not self.rows and content and not content.startswith(b"input,output,"):
-            raise OptionError(f"{path} is not a table of a batch; name another one with --table")
+        if not content:
+            return
+        try:
+            self._parse(content.decode("utf-8-sig", "surrogateescape"))
+        except (ValueError, csv.Error) as error:
+            raise OptionError(
+                f"{path} is not a table of a batch ({error}); name another one with --table"
+            ) from error
 
     def _parse(self, text: str) -> None:
-        for row in csv.DictReader(io.StringIO(text, newline="")):
-            if row.get("output") and None not in row and None not in row.values():
-                self.rows[row["output"]] = {name: row.get(name, "") for name in COLUMNS}
+        head = text.partition("\n")[0].replace('"', "")
+        separator = head.removeprefix("input")[:1]
+        if separator not in (",", ";", "\t") or not head.startswith(f"input{separator}output"):
+            raise ValueError("it does not begin with the names of its columns")
+        whole = io.StringIO(text[: text.rfind("\n") + 1], newline="")
+        reader = csv.DictReader(whole, delimiter=separator)
+        for line in reader:
+            if line.get("output") and None not in line and None not in line.values():
+                row = {name: line.get(name, "") for name in COLUMNS}
+                _make_numbers_plain(row, reader.line_num)
+                if row["error"] or all(row[name] for name in _NUMBERS):
+                    self.rows[row["output"]] = row
 
     def open(self) -> None:
         """Sort the rows that could be read, and open the file for more."""
@@ -113,6 +131,28 @@ class ResultTable:
     def in_order(self) -> list[Row]:
         """Return all rows, sorted by the names of their outputs."""
         return [self.rows[name] for name in sorted(self.rows)]
+
+
+def _make_numbers_plain(row: Row, line: int) -> None:
+    """Write the numbers of a row as they are written here: ``0.5`` for ``0,5``, ``100`` for ``1E+02``.
+
+    Raises
+    ------
+    ValueError
+        Something else is in the place of a number, such as a date, or one with marks for thousands.
+    """
+    for name in _NUMBERS:
+        entry = row[name].strip().replace(",", ".")
+        try:
+            if name not in _COUNTS + _STAMPS:
+                float(entry or 0)
+            elif entry and not entry.isdecimal():
+                if "e" not in entry.lower():
+                    raise ValueError
+                entry = str(int(float(entry)))
+        except (ValueError, OverflowError):
+            raise ValueError(f"{row[name]!r} stands in line {line}, column {name}") from None
+        row[name] = entry
 
 
 def _lines(rows: Iterable[Row]) -> str:

@@ -24,7 +24,7 @@ from ..files.mesh_files import MeshFile
 from ..interop.mesh_data import carry
 from ..measures.quality import side_by_side
 from ..output.result import RemeshResult
-from .arguments import FILE_OPTIONS, given_options, parser, target_length
+from .arguments import FILE_OPTIONS, given_options, parse, parser, target_length
 from .array_files import read_array, write_arrays
 
 __all__ = ["main"]
@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         from . import batch_command as _batch_command
 
         return _ends(_batch_command.run, _batch_command.parsed(words[1:]))
-    options = parser().parse_args(words)
+    options = parse(parser(), words)
     options.call = shlex.join(["remeshvec", *words])
     return _ends(_run, options)
 
@@ -135,10 +135,10 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
         html_page.require_plotly()
         check_writable(options.html, html_page.PAGE_SUFFIXES)
-    paths = [Path(name).resolve() for name in _outputs(options)]
+    paths = [os.path.realpath(name) for name in _outputs(options)]
     if len(set(paths)) < len(paths):
         raise OptionError("two outputs have the same name; give each output its own")
-    if Path(options.input).resolve() in paths[bool(options.output) :]:
+    if os.path.realpath(options.input) in paths[bool(options.output) :]:
         raise OptionError(f"an output beside the mesh would replace the input {options.input}")
 
 

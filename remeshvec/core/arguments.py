@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import OptionError
 
 __all__ = [
+    "asks_to_stop",
     "choice",
     "count",
     "flag",
@@ -171,3 +172,8 @@ def items(value: Any, name: str, noun: str) -> list[Any]:
     if is_text or not isinstance(value, Iterable) or getattr(value, "ndim", 1) == 0:
         raise OptionError(f"{name} must be a sequence of {noun}; got {_in_one_line(value)}")
     return list(value)
+
+
+def asks_to_stop(answer: object) -> bool:
+    """Tell whether the answer of a callback ends the work: False, Python's or NumPy's, not None or 0."""
+    return isinstance(answer, bool | np.bool_) and not answer

@@ -8,7 +8,17 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
-from ..core.arguments import choice, count, flag, function, instance, items, number, path
+from ..core.arguments import (
+    asks_to_stop,
+    choice,
+    count,
+    flag,
+    function,
+    instance,
+    items,
+    number,
+    path,
+)
 from ..core.vocabulary import FloatArray, IntArray
 from ..errors import MeshFormatError, OptionError
 from ..files.disk import reason
@@ -214,7 +224,7 @@ class _Log:
         )
         if self.keeps_frames:
             self.frames.append(frame)
-        if self.callback is not None and self.callback(frame) is False:
+        if self.callback is not None and asks_to_stop(self.callback(frame)):
             self.is_cancelled = True
 
     def is_about_to_break(self) -> bool:

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from ..core.arguments import choice, count, function, number
+from ..core.arguments import asks_to_stop, choice, count, function, number
 from ..core.vocabulary import FloatArray, IntArray
 from ..modelling.solver import LaplacianSolver
 from .energies import double_area_vectors
@@ -174,7 +174,7 @@ def _descend(
         now = with_surface(now, moved)
         pressure, residual = _balance(now, now.forces())
         history.append({"energy": now.energy(), "residual": residual})
-        if callback is not None and callback(step, now, now.energy(), residual) is False:
+        if callback is not None and asks_to_stop(callback(step, now, now.energy(), residual)):
             stop = "cancelled"
             break
     else:

@@ -9,7 +9,7 @@ import secrets
 import shutil
 import stat
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..core import arguments
@@ -121,6 +121,8 @@ def _format_of(data: bytes) -> str | None:
 def write_file(path: FilePath, content: bytes) -> None:
     """Write a file under another name beside it, then rename: nobody sees a half-written file.
 
+    The content is on the disk before the name, so this holds after a loss of power too.
+
     Raises
     ------
     MeshFormatError
@@ -132,12 +134,25 @@ def write_file(path: FilePath, content: bytes) -> None:
         try:
             with open(part, "xb") as file:
                 file.write(content)
+                file.flush()
+                os.fsync(file.fileno())  # or the name may reach the disk without the content
             if target.exists():
                 shutil.copymode(target, part)
             os.replace(part, target)
+            _sync_folder(target.parent)
         except BaseException:
             part.unlink(missing_ok=True)
             raise
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring a new name to the disk, where the system lets folders be opened."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def check_writable(path: FilePath, suffixes: Sequence[str] = ()) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from ..interop.mesh_data import MeshData, split_vertices
 from ..interop.meshio_data import read_meshio, write_meshio
 from ..interop.objects import COLOUR, UV, read_pyvista, read_trimesh
-from ..processes.pool import run_in_processes
+from ..processes.pool import StandingWorker
 
 __all__ = ["can_write", "read_foreign", "write_foreign"]
 
@@ -29,6 +29,9 @@ _WITH_DATA = ("vtk", "vtu", "xdmf", "gmsh22")
 _COLUMNS: dict[str | None, tuple[int, ...]] = {"xdmf": (1, 3, 6, 9), "gmsh22": (1, 3, 9)}
 
 _SCENE = "scene:geometry"
+
+# Some readers never come to the end of a damaged file. The slowest read 1 MB of text in a second.
+_SECONDS, _BYTES_PER_SECOND = 60.0, 200_000
 
 
 def _library(suffix: str) -> tuple[str, Any]:
@@ -79,18 +82,26 @@ def _writer(meshio: Any, suffix: str) -> str | None:
 
 
 def read_foreign(path: Path) -> tuple[MeshData, list[str]]:
-    """Read a file with the library that knows it; returns also notices of data left out."""
+    """Read a file with the library that knows it; returns also notices of data left out.
+
+    The library works in a process of its own, with a limit of a minute and of what the file's size
+    justifies: on damaged files meshio may read for ever, and VTK ends its process if a file asks for
+    more memory than there is. The first file waits for the process and the import, about a second;
+    the process then stays for the next file.
+
+    Raises
+    ------
+    WorkerError
+        The library took too long, or its process died.
+    """
     name, _ = _library(path.suffix.lower())
-    if name != "pyvista":
-        return _read_here(name, path)
-    # VTK ends the process if a damaged file asks for more memory than there is.
-    (outcome,) = run_in_processes(_read_polydata, [path], None, 1)
-    if outcome.error is not None:
-        raise outcome.error
-    return outcome.value
+    limit = _SECONDS + path.stat().st_size // _BYTES_PER_SECOND
+    return _reader((name, path.resolve()), limit)
 
 
-def _read_here(name: str, path: Path) -> tuple[MeshData, list[str]]:
+def _read_here(task: tuple[str, Path], _: None) -> tuple[MeshData, list[str]]:
+    """Read in this process."""
+    name, path = task
     library = importlib.import_module(name)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)  # pyvista reports errors of VTK as warnings
@@ -106,9 +117,7 @@ def _read_here(name: str, path: Path) -> tuple[MeshData, list[str]]:
     return data, [str(warning.message) for warning in noticed]
 
 
-def _read_polydata(path: Path, _: None) -> tuple[MeshData, list[str]]:
-    """Read with pyvista; runs in a worker process."""
-    return _read_here("pyvista", path)
+_reader = StandingWorker(_read_here)
 
 
 def _read_meshio(meshio: Any, path: Path) -> Any:

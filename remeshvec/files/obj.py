@@ -29,8 +29,13 @@ __all__ = ["OBJ_DATA", "ObjFile", "obj_bytes"]
 _PARTS = {"o": "object", "g": "group", "usemtl": "material"}
 OBJ_DATA = frozenset({"uv", "color", *_PARTS.values()})
 
-_CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
+# All keywords of the format, also of curves, free-form surfaces and rendering, which are left out.
+_KEYWORD = re.compile(
+    "v[tnp]?|[flposg]|mg|usemtl|mtllib|usemap|maplib|lod|bevel|[cd]_interp|(shadow|trace)_obj|"
+    "deg|bmat|step|cstype|curv2?|surf|parm|trim|hole|scrv|sp|end|con|[cs]tech"
+)
 _CORNER = re.compile(rb"(-?\d{1,9})(?:/(-?\d*)(?:/-?\d*)?)?")
+_NOT_IN_NAMES = re.compile(r"[\r\n\0#]")
 _ABSENT = (None, b"", b"-")  # a corner without texture coordinate
 
 
@@ -53,9 +58,7 @@ class ObjFile:
     """
 
     def __init__(self, content: bytes) -> None:
-        if b"\\" in content:
-            content = _CONTINUED.sub(b" ", content)
-        self._lines = text_lines(content)
+        self._lines = text_lines(content, continued=True)
         places: defaultdict[bytes, list[int]] = defaultdict(list)
         for i, line in enumerate(self._lines):
             places[line.split(None, 1)[0]].append(i)
@@ -82,7 +85,20 @@ class ObjFile:
     def mesh(self) -> PolygonMesh:
         """Return the vertices and polygons."""
         corners = self._zero_based(self._faces.vertices, "v")
-        return PolygonMesh(self._vertices[:, :3].copy(), corners, self._faces.sizes, [])
+        return PolygonMesh(
+            self._vertices[:, :3].copy(), corners, self._faces.sizes, self._notices()
+        )
+
+    def _notices(self) -> list[str]:
+        """Say which lines were left out because of their keyword: a face may hide in one of them."""
+        unknown = [at for keyword, at in self._places.items() if not _KEYWORD.fullmatch(keyword)]
+        if not unknown:
+            return []
+        places = np.concatenate(unknown)
+        first = shown(self._lines[int(places.min())])
+        return [
+            f"{len(places):,} lines without a keyword of OBJ were left out; the first is {first}"
+        ]
 
     def data(self, V: FloatArray, triangles: Triangles, folder: Path) -> MeshData:
         """Return the mesh with everything else the file holds.
@@ -114,7 +130,7 @@ class ObjFile:
             data.on_vertices["color"] = self._vertices[:, 3:6].copy()
         if len(self._at("mtllib")):
             names = [_decoded(operand) for operand in self._operands("mtllib")]
-            data.extra["mtllib"] = [str((folder / name).resolve()) for name in names]
+            data.extra["mtllib"] = [os.path.realpath(folder / name) for name in names]
         return data
 
     def _texture_coordinates(self) -> FloatArray | None:
@@ -203,7 +219,7 @@ def obj_bytes(data: MeshData, path: Path) -> bytes:
     if colours is not None and colours.dtype.kind == "u":
         colours = colours / np.iinfo(colours.dtype).max
     points = data.V if colours is None else np.column_stack([data.V, colours[:, :3]])
-    lines = [f"mtllib {_relative(name, path)}" for name in data.extra.get("mtllib", [])]
+    lines = [f"mtllib {_in_line(_relative(lib, path))}" for lib in data.extra.get("mtllib", [])]
     lines += _statements("v", np.asarray(points, float))
     F = data.F + 1
     if "uv" in data.on_corners:
@@ -235,11 +251,16 @@ def _add_parts(faces: list[str], data: MeshData) -> None:
             label = int(part[f])
             if names is None or 0 <= label < len(names):
                 name = str(label) if names is None else names[label]
-                faces[f] = f"{keyword} {name}\n{faces[f]}"
+                faces[f] = f"{keyword} {_in_line(name)}\n{faces[f]}"
+
+
+def _in_line(name: str) -> str:
+    """Return a name that ends where its line ends, so that the next statement is read."""
+    return _NOT_IN_NAMES.sub(" ", name).rstrip("\\ \t")
 
 
 def _relative(target: str, path: Path) -> str:
     try:
-        return Path(os.path.relpath(target, path.resolve().parent)).as_posix()
+        return Path(os.path.relpath(target, os.path.dirname(os.path.realpath(path)))).as_posix()
     except ValueError:  # on another drive
         return target

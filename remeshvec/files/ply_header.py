@@ -77,7 +77,8 @@ def parse_header(data: bytes) -> PlyHeader:
     if end is None:
         raise ValueError("the header has no end: the file is cut short, or not PLY")
     form, elements, comments = "", [], []
-    for line in data[: end.start()].decode("utf-8", "replace").splitlines()[1:]:
+    for row in data[: end.start()].splitlines()[1:]:  # as bytes: text has more ends of lines
+        line = row.decode("utf-8", "replace")
         match line.split():
             case ["comment", *_]:
                 comments.append(line.strip().removeprefix("comment").strip())

@@ -33,15 +33,24 @@ _FLOAT_CHARACTERS = b"0123456789+-.eE \t\n"
 _INTEGER_CHARACTERS = b"0123456789- \t\n"
 _EXACT = 1 << 53  # up to here float64 holds every integer
 _INDEX = re.compile(rb"\d{1,9}")
+_COMMENT = re.compile(rb"#[^\r\n]*")
+_CONTINUED = re.compile(rb"\\[ \t]*(?:\r\n?|\n)")
 
 
-def text_lines(data: bytes) -> list[bytes]:
-    """Return the lines of a text in any 8-bit encoding, without comments and blank lines."""
+def text_lines(data: bytes, continued: bool = False) -> list[bytes]:
+    """Return the lines of a text in any 8-bit encoding, without comments and blank lines.
+
+    Only carriage returns and line feeds end a line: form feeds and Unicode's separators may be part of a
+    name, and what follows one must not become a statement. ``continued``: a backslash at the end joins a
+    line and the next, but not in a comment, which may end with the name of a folder.
+    """
     if b"\0" in data:
         raise ValueError("it holds binary data or UTF-16 where text is expected")
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"#" in data:
-        data = re.sub(rb"#[^\r\n]*", b"", data)
+        data = _COMMENT.sub(b"", data)
+    if continued and b"\\" in data:
+        data = _CONTINUED.sub(b" ", data)
     return [line for line in map(bytes.strip, data.splitlines()) if line]
 
 

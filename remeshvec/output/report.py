@@ -62,12 +62,12 @@ class Report:
 
     @cached_property
     def quality_before(self) -> Quality:
-        """Quality of the input; computed when first asked for, from the caller's arrays."""
+        """Quality of the input; computed when first asked for."""
         return quality(*self.before, L=self.target_length)
 
     @cached_property
     def quality_after(self) -> Quality:
-        """Quality of the output; computed when first asked for."""
+        """Quality of the output; computed when first asked for, from the arrays of the result."""
         return quality(*self.after, L=self.target_length)
 
     def to_dict(self) -> dict[str, Any]:

@@ -26,7 +26,8 @@ class RemeshResult:
     """A remeshed surface; unpacks as ``V, F = result``.
 
     What few callers read is computed when it is first asked for. Until then a result holds the faces
-    of the input and its own once more in memory.
+    of the input and its own once more in memory. It keeps a copy of the input, so the caller may go on to
+    change those arrays in place.
 
     Attributes
     ----------

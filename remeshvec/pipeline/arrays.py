@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..core.arguments import count, function
 from ..core.check import as_mesh
@@ -57,9 +57,11 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
         out = _extract(job, done, constraints, len(faces), np.asarray(F).dtype)
         with watch.time("extract"):
             V2 = out.V.astype(_vertex_dtype(V), copy=False)
+    with watch.time("extract"):
+        before = _kept(V, vertices), faces.astype(np.int32)
     report = Report(
         done.length, recipe, done.counts, watch.stop(), done.stop, job.prepared.dirt,
-        done.featured.counts, done.deviation, before=(V, F), after=(V2, out.F),
+        done.featured.counts, done.deviation, before=before, after=(V2, out.F),
     )  # fmt: skip
     return _result(V2, out, report)
 
@@ -118,6 +120,11 @@ def _wanted_count(L: Any, options: RemeshOptions) -> tuple[str, int] | None:
         if value is not None:
             return name.removeprefix("n_"), count(value, name)
     return None
+
+
+def _kept(given: Any, checked: NDArray[Any]) -> NDArray[Any]:
+    """Return an array that the caller cannot change: results read the input long after the call."""
+    return checked.copy() if np.may_share_memory(np.asarray(given), checked) else checked
 
 
 def _vertex_dtype(V: ArrayLike) -> np.dtype[Any]:

@@ -148,8 +148,8 @@ def remesh(
     threads : int, optional
         Threads to use at most; all by default. Meshes below 50,000 faces use one.
     callback : callable, optional
-        Called as ``callback(sweep, phase, count)`` after each phase; returning False ends the call
-        with the mesh as it is then.
+        Called as ``callback(sweep, phase, count)`` after each phase; returning False (Python's or
+        NumPy's; not None or 0) ends the call with the mesh as it is then.
 
     Returns
     -------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..core.arguments import asks_to_stop
 from ..core.stopwatch import Stopwatch
 from ..input.options import Callback
 
@@ -34,4 +35,5 @@ class Monitor:
         """Tell the callback that a phase is done."""
         if self._callback is not None:
             count = self.counts[-1].get(phase, 0)
-            self.is_cancelled = self._callback(len(self.counts) - 1, phase, count) is False
+            answer = self._callback(len(self.counts) - 1, phase, count)
+            self.is_cancelled = asks_to_stop(answer)

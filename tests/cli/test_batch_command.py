@@ -279,6 +279,42 @@ def test_a_table_that_was_cut_short(folder, calls):
         assert ResultTable("out/results.csv").rows == {}
 
 
+def test_a_table_that_a_spreadsheet_saved(folder, calls, capsys):
+    assert here() == 0
+    path = Path("out/results.csv")
+    content = path.read_text()
+    with_commas = "\ufeff" + content.replace(",", ";").replace(".", ",").replace("\n", "\r\n")
+    with_commas = (
+        with_commas.replace(",obj", ".obj").replace(",ply", ".ply").replace(",off", ".off")
+    )
+    with_commas = with_commas.replace(
+        remeshvec.__version__.replace(".", ","), remeshvec.__version__
+    )
+    quoted = "".join(
+        ",".join(f'"{cell}"' for cell in line.split(",")) + "\n" for line in content.splitlines()
+    )
+    for saved in ("\ufeff" + content, content.replace(",", "\t"), with_commas, quoted):
+        path.write_text(saved, newline="")
+        calls.clear()
+        assert here() == 0 and calls == []
+        assert path.read_text() == content
+    rows = table()
+    stamp = rows["b/x.obj"]["input_mtime_ns"]
+    path.write_text(content.replace(stamp, f"{float(stamp):.5E}"))
+    assert here() == 0 and "b/x.obj" in calls  # and others written in the same moment
+    faces = rows["b/x.obj"]["faces_before"]
+    for wrong in ("1,000", "Jan 98", "1.000"):
+        path.write_text(content.replace(f",{faces},", f',"{wrong}",'))
+        capsys.readouterr()
+        assert here() == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and f"'{wrong}' stands in line" in error
+        assert "faces_before" in error and wrong in path.read_text()
+    path.write_bytes(content.encode("utf-16"))
+    assert here() == 2
+    assert "is not a table of a batch" in capsys.readouterr().err
+
+
 def test_odd_names_survive(folder, calls):
     V, F = zoo.grid(4, 4)
     names = ['comma, and quote".obj', "line\nbreak.obj", "\N{SNOWMAN}.obj", " blank .obj"]

@@ -189,11 +189,18 @@ def test_notices_and_dirt_are_shown(sheet, capsys):
         (["in.obj", "--save-stats", "none/s.json"], "there is no folder"),
         (["in.obj", "-o", "a.json", "--save-stats", "a.json"], "two outputs have the same name"),
         (["in.obj", "--save-stats", "in.obj"], "would replace the input in.obj"),
+        (["ring.obj"], "cannot read ring.obj: "),
+        (["ring.obj", "-o", "out.obj"], "cannot read ring.obj: "),
+        (["ring.vtp"], "cannot read ring.vtp: "),
+        (["batch", "ring.obj", "--out", "out"], "ring.obj: there is no such mesh file"),
     ],
 )
 def test_bad_input_ends_with_one_line_before_the_work(arguments, reason, sheet, capsys, asked):
     Path("broken.obj").write_text("v 0 0 0\nf 1\n")
     Path("folder.obj").mkdir()
+    for suffix in (".obj", ".vtp"):
+        Path(f"ring{suffix}").symlink_to(f"back{suffix}")
+        Path(f"back{suffix}").symlink_to(f"ring{suffix}")
     names = sorted(os.listdir())
     assert main(arguments) == 2
     out, err = capsys.readouterr()
@@ -213,6 +220,12 @@ def test_bad_input_ends_with_one_line_before_the_work(arguments, reason, sheet, 
         ["in.obj", "--iterations", "1.5"],
         ["in.obj", "--threads", "0"],
         ["in.obj", "--preset", "best"],
+        ["in.obj", "-o", ""],
+        ["in.obj", "--save-stats="],
+        ["in.obj", "--fixed-faces", ""],
+        [""],
+        ["batch", "in.obj", "", "--out", "out"],
+        ["batch", "in.obj", "--out", ""],
     ],
 )
 def test_bad_arguments_end_with_the_usage(arguments, sheet, capsys):

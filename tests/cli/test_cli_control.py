@@ -113,6 +113,8 @@ def test_numbers_are_read_as_people_write_them(tmp_path):
     path = tmp_path / "numbers.txt"
     path.write_text("# what\n1, 2\n3 4 # and why\n\n")
     assert read_array(str(path), 2).tolist() == [[1, 2], [3, 4]]
+    (tmp_path / "separated.txt").write_text("# a\u2028 9\x0c 9\n1\n", encoding="utf-8")
+    assert read_array(str(tmp_path / "separated.txt")).tolist() == [1]
     assert read_array(str(path)).dtype == np.int64
     np.save(tmp_path / "mask.npy", np.array([True, False]))
     assert read_array(str(tmp_path / "mask.npy")).dtype == np.bool_

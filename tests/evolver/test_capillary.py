@@ -216,7 +216,7 @@ def test_nothing_free():
 def test_callbacks_end_it(ball):
     seen = []
     problem = CapillaryProblem(*ball, volume=4.0)
-    found = minimize(problem, callback=lambda *args: seen.append(args) or len(seen) < 3)
+    found = minimize(problem, callback=lambda *args: seen.append(args) or np.bool_(len(seen) < 3))
     assert found.stop == "cancelled" and len(found.history) == 3
     assert [args[0] for args in seen] == [0, 1, 2]
 

@@ -1,13 +1,18 @@
 """Files of every kind come back remeshed with what they carried, or say what they cannot hold."""
 
 import json
+import os
+from contextlib import suppress
+from time import perf_counter
 
 import numpy as np
 import pytest
+from helpers.hostile_files import LEGAL, OBJ
 
 from data.shapes import textured
 from remeshvec import MeshFormatError, read_mesh
 from remeshvec.batch.one_file import remesh_file
+from remeshvec.files import foreign
 from remeshvec.files.data_files import read_data, write_data
 from remeshvec.interop.mesh_data import MeshData
 
@@ -227,6 +232,51 @@ def test_obj_with_data_has_the_faces_of_the_mesh(tmp_path, change):
     assert data.on_faces["material"].tolist() == [0, 0]
 
 
+@pytest.mark.parametrize("name", LEGAL)
+def test_both_readers_find_the_same_mesh(name, tmp_path):
+    (tmp_path / name).write_bytes(LEGAL[name])
+    data, notices = read_data(tmp_path / name)
+    mesh = read_mesh(tmp_path / name)
+    assert np.array_equal(data.V, mesh.V) and np.array_equal(data.F, mesh.F)
+    assert notices == mesh.notices
+
+
+@pytest.mark.parametrize("line", ["f\u00a01 2 3", "F 1 2 3", "fo 1 2 3", "f1 2 3"])
+def test_lines_without_a_known_keyword_are_named(line, tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_bytes(OBJ + f"{line}\nl 1 2\ncstype bezier\nnonsense\n".encode())
+    for notices in (read_data(path)[1], read_mesh(path).notices):
+        assert len(notices) == 1 and notices[0].startswith("2 lines without a keyword of OBJ")
+        assert line[0] in notices[0]
+
+
+@pytest.mark.parametrize(
+    "name", ["a\nf 1 2 3", "a\rf 1 2 3", "a\\", "a \\ \\\t", "a # b", "a\u2028f 1 2 3", "", "\n"]
+)
+def test_no_name_changes_what_is_written(name, tmp_path):
+    data = loaded_cube()
+    data.extra |= {"group": [name, "upper half"], "mtllib": [str(tmp_path / name / "a.mtl")]}
+    write_data(tmp_path / "a.obj", data)
+    for F in (read_data(tmp_path / "a.obj")[0].F, read_mesh(tmp_path / "a.obj").F):
+        assert np.array_equal(F, data.F)
+
+
+def test_the_time_to_read_obj_is_linear(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_bytes(OBJ + b"".join(b"g %d\nf 1 2 3\n" % i for i in range(60_000)))
+    start = perf_counter()
+    assert len(read_data(path)[0].extra["group"]) == 60_000
+    digits = b"1" * 300_000
+    for old, new in [
+        (b"v 1", b"v " + digits), (b"v 1", b"v " + digits + b"x"), (b"v 1", b"v 0." + digits),
+        (b"f 1", b"f 1/" + digits), (b"f 1", b"f 1" + b"/" * 300_000), (b"v 1", b"\\ " * 150_000),
+    ]:  # fmt: skip
+        path.write_bytes(OBJ.replace(old, new))
+        with suppress(MeshFormatError):
+            read_data(path)
+    assert perf_counter() - start < 5
+
+
 @pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".xdmf", ".msh", ".vtp"])
 def test_formats_with_fields(tmp_path, suffix):
     for library in {".vtp": ["pyvista"], ".xdmf": ["meshio", "h5py"]}.get(suffix, ["meshio"]):
@@ -327,6 +377,42 @@ def test_broken_files_end_with_our_exception(tmp_path, suffix):
     with pytest.raises(MeshFormatError, match="folder"):
         (tmp_path / f"d{suffix}").mkdir()
         read_data(tmp_path / f"d{suffix}")
+
+
+def test_a_reader_that_never_ends_is_ended(tmp_path, monkeypatch):
+    pytest.importorskip("meshio")
+    path = tmp_path / "endless.bdf"
+    path.write_text("SOL 101\nCEND\nBEGIN BULK\n")
+    monkeypatch.setattr(foreign, "_SECONDS", 0.2)
+    with pytest.raises(MeshFormatError, match=r"cannot read .*endless\.bdf: it took longer"):
+        read_data(path)
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".bdf", ".vtp", ".glb"])
+def test_pipes_and_devices_are_refused(tmp_path, suffix):
+    os.mkfifo(tmp_path / f"pipe{suffix}")
+    (tmp_path / f"zero{suffix}").symlink_to("/dev/zero")
+    for name in ("pipe", "zero"):
+        with pytest.raises(MeshFormatError, match="regular file"):
+            read_data(tmp_path / f"{name}{suffix}")
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtp", ".glb"])
+def test_nothing_is_lost_between_processes(tmp_path, suffix):
+    library = {".vtp": "pyvista", ".glb": "trimesh"}.get(suffix, "meshio")
+    pytest.importorskip(library)
+    path = tmp_path / f"a{suffix}"
+    write_data(path, loaded_cube())
+    here, notices = foreign._read_here((library, path), None)
+    data, others = read_data(path)
+    assert others == notices and data.feature_data == here.feature_data
+    for name in ("on_vertices", "on_faces", "on_corners"):
+        there, known = getattr(data, name), getattr(here, name)
+        assert list(there) == list(known)
+        for key, values in known.items():
+            assert there[key].dtype == values.dtype and np.array_equal(there[key], values)
+    assert data.V.dtype == here.V.dtype and np.array_equal(data.V, here.V)
+    assert data.F.dtype == here.F.dtype and np.array_equal(data.F, here.F)
 
 
 def test_unknown_suffixes_are_named(tmp_path):

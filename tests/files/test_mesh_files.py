@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import stat
 import struct
 from pathlib import Path
 
@@ -207,6 +208,18 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(failing, error, tmp_path
     assert isinstance(caught.value, KeyboardInterrupt) or "No space left" in str(caught.value)
     assert os.listdir(tmp_path) == ["a.obj"]
     assert (tmp_path / "a.obj").read_bytes() == b"old"
+
+
+def test_the_content_is_on_the_disk_before_the_name(tmp_path, monkeypatch):
+    done = []
+    monkeypatch.setattr("os.fsync", lambda descriptor: done.append(os.fstat(descriptor).st_mode))
+    replace = os.replace
+    monkeypatch.setattr("os.replace", lambda *names: (done.append("rename"), replace(*names)))
+    write_file(tmp_path / "a.obj", b"new")
+    assert stat.S_ISREG(done[0]) and done[1] == "rename" and stat.S_ISDIR(done[2])
+    monkeypatch.setattr("os.open", lambda *_: (_ for _ in ()).throw(PermissionError()))
+    write_file(tmp_path / "a.obj", b"newer")  # where folders cannot be opened
+    assert (tmp_path / "a.obj").read_bytes() == b"newer"
 
 
 def test_permissions_and_links_are_kept(tmp_path):

@@ -81,6 +81,12 @@ LEGAL = {
     "comment at the end of a line.obj": OBJ.replace(b"f 1 3 2", b"f 1 3 2 # one"),
     "comment longer than a line buffer.obj": b"# " + b"f 1 2 " * 5000 + b"\n" + OBJ,
     "continued line.obj": OBJ.replace(b"f 1 3 2", b"f 1 \\\n3 2"),
+    "continued line of an old mac.obj": OBJ.replace(b"\n", b"\r").replace(b"f 1 ", b"f 1 \\\r", 1),
+    "comment that ends with a backslash.obj": OBJ.replace(b"f 1 3", b"# C:\\a\\\nf 1 3"),
+    "tabs beside a group.obj": b"g a\n" + OBJ.replace(b"f ", b"f\t"),
+    "form feeds.obj": b"g a\x0cf 1 2 3\n" + OBJ.replace(b"f ", b"f\x0c"),
+    "separators in a name.obj": "g a\u2028f 1 2 3\x85f 1 2 3\x1cf 1 2 3\x0bf 1 2 3\n".encode()
+    + OBJ,
     "negative indices.obj": OBJ.replace(b"f 3 1 4", b"f -2 -4 -1"),
     "texture seam and normals.obj": with_textures(OBJ),
     "face with and without texture.obj": OBJ.replace(b"f 1 3 2", b"vt 0 0\nf 1/1 3 2"),
@@ -104,6 +110,9 @@ LEGAL = {
     "single precision.ply": binary_ply(point="float"),
     "carriage returns.ply": ply().replace(b"\n", b"\r\n"),
     "singular name.ply": binary_ply().replace(b"vertex_indices", b"vertex_index"),
+    "separators in a comment.ply": ply().replace(
+        b"by a test", "\u2028element face 9\x0cproperty int a\x85end_header".encode()
+    ),
     "new type names.ply": binary_ply().replace(b"uchar int", b"uint8 int32"),
     "binary.stl": stl(),
     "binary that begins with solid.stl": stl(header=b"solid part"),

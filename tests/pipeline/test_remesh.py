@@ -276,6 +276,14 @@ def test_cancelled_calls_return_a_mesh(phase):
     assert assert_births(result, V, F).all()
 
 
+@pytest.mark.parametrize("answer", [False, np.False_, True, np.True_, None, 0, 0.0, "", []])
+def test_only_false_ends_the_call(answer):
+    V, F = zoo.grid(4, 4)
+    result = remesh(V, F, 0.5, iterations=1, callback=lambda *_: answer)
+    is_false = isinstance(answer, bool | np.bool_) and not answer
+    assert (result.report.stop == remesh(V, F, 0.5, iterations=1).report.stop) != is_false
+
+
 def test_an_error_in_the_callback_comes_out_and_leaves_no_trace():
     V, F = zoo.torus()
 

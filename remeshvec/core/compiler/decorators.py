@@ -22,6 +22,7 @@ from numba.extending import register_jitable
 
 from ..threads import share, uninterrupted
 from .cache_keys import keyed
+from .disk_cache import FORMAT, keep_on_disk
 from .unsigned_indices import UnsignedIndexCompiler
 
 __all__ = ["ThreadedKernel", "inlined", "kernel", "shared", "threaded"]
@@ -81,9 +82,10 @@ class kernel:  # lower case: a decorator, used like a function
     @cached_property
     def compiled(self) -> Any:
         """The function, compiled by Numba for the types of its arguments."""
-        flags = sorted(_FLAGS.items()), sorted(_INLINED.items())
-        compiled = numba.njit(cache=True, **_FLAGS)(keyed(self.py_func, flags))
+        flags = sorted(_FLAGS.items()), sorted(_INLINED.items()), FORMAT
+        compiled = numba.njit(**_FLAGS)(keyed(self.py_func, flags))
         if hasattr(compiled, "_compile_for_args"):  # not where the compiler is switched off
+            keep_on_disk(compiled)
             compiled._compile_for_args = partial(uninterrupted, compiled._compile_for_args)
         return compiled
 

@@ -1,4 +1,4 @@
-"""What happens during a slow first call, while Numba compiles kernels."""
+"""What happens during a slow first call, while Numba compiles kernels; lines that say it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,17 @@ from typing import Any
 
 from numba.core import event
 
-__all__ = ["compile_notice"]
+__all__ = ["compile_notice", "print_once"]
+
+_printed: set[str] = set()
+
+
+def print_once(line: str) -> None:
+    """Print a line for the user, unless one that begins with the same words was printed before."""
+    start = " ".join(line.split()[:5])
+    if start not in _printed:
+        _printed.add(start)
+        print(f"remeshvec: {line}", file=sys.stderr, flush=True)
 
 
 class _Listener(event.Listener):
@@ -23,7 +33,6 @@ class _Listener(event.Listener):
 
     def __init__(self) -> None:
         self.requested = 0
-        self.printed = False
         self.depth = 0
         self.paused = False
 
@@ -34,13 +43,8 @@ class _Listener(event.Listener):
         if self.depth == 1 and gc.isenabled():
             self.paused = True
             gc.disable()
-        if self.requested and not self.printed:
-            self.printed = True
-            print(
-                "remeshvec: compiling kernels for this machine (once, about 20 s; then cached)",
-                file=sys.stderr,
-                flush=True,
-            )
+        if self.requested:
+            print_once("compiling kernels for this machine (once, about 20 s; then cached)")
 
     def on_end(self, event: Any) -> None:
         if not _is_ours(event):
