@@ -33,6 +33,10 @@ __all__ = [
 ]
 
 
+# A flat face keeps this share of its height by its longest side.
+_FLATTER = 0.7
+
+
 @inlined
 def keeps_curves(mesh, h, a, b):
     """Guard: fixed and held vertices stay, and a vertex of a curve leaves along this curve only.
@@ -114,13 +118,15 @@ def folds_over(mesh, place, kind, a, b, rings, cosine):
     """Guard: a face that stays would turn its normal too far, or lose its area.
 
     ``kind`` is that of the vertex that stays. On a straight curve, a face with all corners on curves may
-    become flat, and its normal is then rounding noise; such a collapse is refused too.
+    become flat, and its normal is then rounding noise; such a collapse is refused too. A face that is
+    flat already may stay so: along fine curves all are, and could never be thinned.
     """
     at = rings.place
     normal = rings.normal
     p = place[0], place[1], place[2]
     for side in range(2):
         other = a if side else b
+        centre = point(mesh.X, b if side else a)
         for i in range(rings.size[side, 0]):
             j = i + 1 if i + 1 < rings.size[side, 1] else 0
             v = rings.vertex[side, i]
@@ -138,8 +144,13 @@ def folds_over(mesh, place, kind, a, b, rings, cosine):
                 if turn_exceeds(old, new, cosine):
                     return True
             on_curves = kind >= CURVE and mesh.kind[v] >= CURVE and mesh.kind[w] >= CURVE
-            if on_curves and is_flat(nx, ny, nz, _longest_squared(p, pv, pw)):
-                return True
+            if on_curves:
+                longest = _longest_squared(p, pv, pw)
+                if is_flat(nx, ny, nz, longest):
+                    old_longest = _longest_squared(centre, pv, pw)
+                    height = sqrt(nx * nx + ny * ny + nz * nz) / longest
+                    if height * old_longest < _FLATTER * normal[side, i, 3]:
+                        return True
     return False
 
 
