@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from benchmarks.panels import Panel, Picture, by_amount
+from data.shapes.hard import thin_ring
 from remeshvec import remesh
 
 from .scene import (
@@ -95,6 +98,21 @@ def fit() -> Picture:
     return side_by_side(panels, CREATURE)
 
 
+def avoid_intersections() -> Picture:
+    """A tube whose wall is thinner than a chord bulges; faces that cross others in colour."""
+    V, F = thin_ring(0.006)
+    panels = []
+    for avoid in (False, True):
+        result = remesh(V, F, 0.3, avoid_intersections=avoid)
+        crossing = result.report.find_defects(check_intersections=True).crossing
+        amount = np.zeros(len(result.F))
+        amount[crossing] = 1.0
+        note = f", {len(crossing)} faces cross others"
+        caption = f"avoid_intersections={avoid}"
+        panels.append(panel(caption, result, by_amount(amount, 1.0), note))
+    return side_by_side(panels, (20.0, 35.0))
+
+
 def _lengths(choices: list[dict[str, Any]]) -> Picture:
     V, F = mesh("creature")
     panels = []
@@ -118,4 +136,5 @@ def _say(choice: dict[str, Any]) -> str:
 
 PICTURES = (
     preset, iterations, split, collapse, foldover, sliver_check, project, untangle_angle, fit,
+    avoid_intersections,
 )  # fmt: skip

@@ -287,6 +287,11 @@ def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
         default=None,
         help="let vertices leave the input a little so that faces lie closer to it",
     )
+    group.add_argument(
+        "--avoid-intersections",
+        action="store_true",
+        help="let no face cross another that did not cross one in the input",
+    )
     group.add_argument("--threads", type=_at_least_one, metavar="N", help="number of threads")
 
 

@@ -70,6 +70,7 @@ class RemeshOptions:
     project: bool | None = None
     untangle_angle: float | None = None
     fit: bool | None = None
+    avoid_intersections: bool = False
     # Limits.
     tol: float | None = None
     max_faces: int = MAX_FACES
@@ -101,6 +102,7 @@ class RemeshKeywords(TypedDict, total=False):
     project: bool | None
     untangle_angle: float | None
     fit: bool | None
+    avoid_intersections: bool
     tol: float | None
     max_faces: int
     threads: int | None

@@ -42,6 +42,7 @@ class Recipe:
     fit_rounds: int = 0
     tol: float | None = None  # stop where a sweep changes less
     max_deviation: float | None = None  # distance from the input, in its units
+    avoid_intersections: bool = False  # no face may cross another that did not
     threads: int = 1
 
     @property
@@ -128,6 +129,7 @@ _CHECKS = {
     "max_deviation": lambda value, name: number(value, name, above=0.0, unit="units of V"),
     "sliver_check": flag,
     "project": flag,
+    "avoid_intersections": flag,
 }
 
 

@@ -8,11 +8,15 @@ from numpy.typing import NDArray
 from ..core.compiler import compile_notice
 from ..core.threads import thread_scope
 from ..core.vocabulary import NONE, FloatArray, IndexArray, IntArray, Mesh
-from ..reference.bvh import build_tree, closest_points
+from ..reference.bvh import build_tree, closest_points, face_distance, walk_to
 from .records import Births, Provenance
 from .sides import locate_corners
 
-__all__ = ["corner_births", "face_births", "images", "vertex_births"]
+__all__ = ["corner_births", "face_births", "images", "turned_faces", "vertex_births"]
+
+# A face of the input that looks the same way is as close within this share of the target length, and
+# twice the distance of the closest.
+_AS_CLOSE = 0.2
 
 
 def vertex_births(p: Provenance) -> Births:
@@ -33,13 +37,52 @@ def corner_births(p: Provenance) -> Births:
 
 def face_births(p: Provenance) -> IntArray:
     """Faces of the input closest to the centroids of the faces (m,), in their own patches."""
+    return p.face_source[_faces_below(p)[0]].astype(np.int64)
+
+
+def turned_faces(p: Provenance) -> IntArray:
+    """Faces that look against the face of the input closest to their centroids.
+
+    Not so where a face that looks the same way is almost as close, as on thin sheets.
+    """
+    below, centroids = _faces_below(p)
+    normals = _area_vectors(p.mesh.X, p.mesh.origin.reshape(-1, 3)[p.rows])
+    X, F = p.reference.X, p.reference.origin.reshape(-1, 3)
+    against = _area_vectors(X, F)
+    suspects = np.flatnonzero((normals * against[below]).sum(axis=1) < 0.0)
+    if not len(suspects):
+        return suspects
+    low, high = X[F, :3].min(axis=1), X[F, :3].max(axis=1)
+    tree = p.reference.tree
+    found = []
+    for f in suspects.tolist():
+        point = centroids[f]
+        _, _, squared = walk_to(tree, point[None], below[f : f + 1])
+        reach = (
+            2.0 * float(np.sqrt(squared[0])) + _AS_CLOSE * p.mesh.X[p.mesh.origin[3 * p.rows[f]], 3]
+        )
+        near = ((low <= point + reach) & (high >= point - reach)).all(axis=1)
+        agree = np.flatnonzero(near & (against @ normals[f] > 0.0))
+        distances = [face_distance(tree.corners, g, tuple(point))[2] for g in agree.tolist()]
+        if not distances or min(distances) > reach * reach:
+            found.append(f)
+    return np.array(found, np.int64)
+
+
+def _area_vectors(X: FloatArray, F: IndexArray) -> FloatArray:
+    a, b, c = (X[F[:, i], :3] for i in range(3))
+    return np.asarray(np.cross(b - a, c - a))
+
+
+def _faces_below(p: Provenance) -> tuple[IndexArray, FloatArray]:
+    """Faces of the reference closest to the centroids of the faces, in their patches; centroids."""
     near, _ = locate_corners(p)
     centroids = p.mesh.X[p.mesh.origin.reshape(-1, 3)[p.rows], :3].mean(axis=1)
     with compile_notice(), thread_scope(p.threads) as parallel:
         p.reference.surface.parallel = parallel
         hint = near[:, 0].astype(np.int32)
         face, _ = closest_points(p.reference.tree, centroids, hint, p.trust, parallel)
-    return p.face_source[face].astype(np.int64)
+    return face, centroids
 
 
 def images(p: Provenance) -> Births:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 from numpy.typing import ArrayLike
 
+from ..core.arguments import flag
+from ..core.vocabulary import IntArray
 from ..input.recipe import Recipe
 from ..measures.quality import Quality, quality
+from .defects import Defects, find_defects
 
 __all__ = [
     "Report",
@@ -54,6 +58,7 @@ class Report:
     deviation: dict[str, float]
     before: tuple[ArrayLike, ArrayLike] = field(repr=False)
     after: tuple[ArrayLike, ArrayLike] = field(repr=False)
+    turned: Callable[[], IntArray] = field(repr=False)
 
     @property
     def preset(self) -> str:
@@ -70,6 +75,27 @@ class Report:
         """Quality of the output; computed when first asked for, from the arrays of the result."""
         return quality(*self.after, L=self.target_length)
 
+    @cached_property
+    def defects(self) -> Defects:
+        """What is wrong with the result, but for intersections; found when first asked for."""
+        return self.find_defects()
+
+    def find_defects(self, check_intersections: bool = False) -> Defects:
+        """Look for folds, slivers, and faces without area or turned over against the input.
+
+        Parameters
+        ----------
+        check_intersections : bool
+            Whether to look for faces that cross others too.
+
+        Raises
+        ------
+        OptionError
+            ``check_intersections`` is not a boolean.
+        """
+        check = flag(check_intersections, "check_intersections")
+        return find_defects(*self.after, self.turned, check)
+
     def to_dict(self) -> dict[str, Any]:
         """Return everything as a JSON-ready dict."""
         return {
@@ -82,6 +108,7 @@ class Report:
             "dirt": self.dirt,
             "features": self.features,
             "deviation": self.deviation,
+            "defects": self.defects.to_dict(),
             "quality_before": self.quality_before.to_dict(),
             "quality_after": self.quality_after.to_dict(),
         }

@@ -19,7 +19,7 @@ from ..input.constraints import Constraints, make_constraints
 from ..input.options import RemeshOptions
 from ..input.prepare import prepare
 from ..input.recipe import Recipe, make_recipe
-from ..output.births import corner_births, face_births, images, vertex_births
+from ..output.births import corner_births, face_births, images, turned_faces, vertex_births
 from ..output.extract import Output, extract, locate
 from ..output.report import Report
 from ..output.result import RemeshResult
@@ -62,6 +62,7 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
     report = Report(
         done.length, recipe, done.counts, watch.stop(), done.stop, job.prepared.dirt,
         done.featured.counts, done.deviation, before=before, after=(V2, out.F),
+        turned=LazyRecipe(partial(turned_faces, out.provenance)),
     )  # fmt: skip
     return _result(V2, out, report)
 

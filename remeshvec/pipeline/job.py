@@ -19,7 +19,7 @@ from ..sizing.adaptive import Adaptive
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
 from ..sweeps.deviation import DeviationCheck
 from ..sweeps.finish import finish, has_finish, measure_deviation
-from ..sweeps.flaws import CrossingCheck, FoldCheck, has_new_flaws
+from ..sweeps.flaws import CrossingCheck, FoldCheck, count_new_flaws
 from ..sweeps.guard import Check, Guard, HoldingGuard
 from ..sweeps.loop import Stop, run_sweeps
 from ..sweeps.monitor import Monitor
@@ -111,12 +111,13 @@ class Job:
             featured, length = self._build_reference(meshes[0], L)
         before = meshes[0].copy()
         work, stop = self._guarded(meshes.pop(), featured, ())
-        n_flaws = 0 if monitor.is_cancelled else has_new_flaws(before, work.mesh)
+        n_flaws = 0 if monitor.is_cancelled else self._count_flaws(before, work.mesh)
         if n_flaws:
             checks = FoldCheck(), CrossingCheck(self.parallel)
             other, other_stop = self._guarded(before.copy(), featured, checks)
-            if has_new_flaws(before, other.mesh) < n_flaws:
-                work, stop = other, other_stop
+            n_left = self._count_flaws(before, other.mesh)
+            if n_left < n_flaws:
+                work, stop, n_flaws = other, other_stop, n_left
         is_compact = has_finish(work)
         return Remeshed(
             work.mesh,
@@ -124,9 +125,14 @@ class Job:
             featured,
             length / self.prepared.scale,
             monitor.counts,
-            _in_words(stop, self.recipe.tol),
+            _in_words(stop, self.recipe.tol, n_flaws),
             measure_deviation(work),
         )
+
+    def _count_flaws(self, before: Mesh, after: Mesh) -> int:
+        """Count the flaws that sweeps have made."""
+        parallel = self.parallel if self.recipe.avoid_intersections else None
+        return count_new_flaws(before, after, parallel)
 
     def _guarded(
         self, mesh: Mesh, featured: FeaturedReference, checks: tuple[Check, ...]
@@ -174,13 +180,16 @@ def _adaptation(prepared: Prepared, sizing: Sizing) -> Adaptation | None:
     )
 
 
-def _in_words(stop: Stop, tol: float | None) -> str:
-    if stop is not Stop.CONVERGED:
-        return str(stop.value)
-    return (
-        f"converged (tol): the last sweep changed less than {tol:g} of the edges and moved "
-        f"vertices by less than {tol:g} L"
-    )
+def _in_words(stop: Stop, tol: float | None, n_flaws: int) -> str:
+    words = str(stop.value)
+    if stop is Stop.CONVERGED:
+        words += (
+            f" (tol): the last sweep changed less than {tol:g} of the edges and moved "
+            f"vertices by less than {tol:g} L"
+        )
+    if n_flaws:
+        words += f"; {n_flaws} folds or flat faces are new, see report.defects"
+    return words
 
 
 def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:

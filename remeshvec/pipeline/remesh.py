@@ -140,6 +140,9 @@ def remesh(
     fit : bool, optional
         Let vertices leave the input by up to 0.2 L so that faces straddle it: less RMS
         distance. On in ``"fine"``.
+    avoid_intersections : bool
+        Let no face cross another that did not cross one in the input. The mesh stays as it was where
+        that would happen; such calls take many times as long.
     tol : float, optional
         Stop after a sweep that changed less than this share of the edges and moved vertices by less
         than ``tol * L`` (root mean square). By default all sweeps are run.

@@ -18,7 +18,7 @@ from ..core.vocabulary import (
 from ..features.polyline import find_siblings
 from ..reference.build import FeaturedReference
 from ..reference.bvh import closest_faces
-from .guard import tree_of
+from .guard import Offenders, tree_of
 
 __all__ = ["DeviationCheck", "edges_to_refine", "sample_mesh", "shortened_lengths"]
 
@@ -90,11 +90,12 @@ class DeviationCheck:
         _, from_input = closest_faces(tree, self.samples, anywhere, trust, self.parallel)
         return points, to_input, from_input
 
-    def offenders(self, mesh: Mesh, tree: Tree) -> FloatArray:
-        """Return the samples of either surface that lie too far from the other, (k, 3)."""
+    def offenders(self, mesh: Mesh, tree: Tree) -> Offenders:
+        """Return the samples of either surface that lie too far from the other."""
         limit = _SAMPLED_SHARE * self.distance
         points, to_input, from_input = self.distances(mesh, tree, limit)
-        return np.concatenate([points[to_input > limit], self.samples[from_input > limit]])
+        far = np.concatenate([points[to_input > limit], self.samples[from_input > limit]])
+        return Offenders(far, np.empty(0, np.int32))
 
     def measure(self, mesh: Mesh) -> dict[str, float]:
         """Largest distance of a sample, each way."""

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..core.vocabulary import DEAD, BoolArray, FloatArray, IndexArray, Mesh, Tree
 from ..reference.crossings import crossing_faces
+from .guard import Offenders, tree_of
 
-__all__ = ["CrossingCheck", "FoldCheck", "has_new_flaws"]
+__all__ = ["CrossingCheck", "FoldCheck", "count_new_flaws"]
 
 # Cosine of a turn of 150 degrees, from which on an edge counts as folded.
 _FOLDED = -0.8660254037844387
@@ -49,6 +50,11 @@ def _ends(mesh: Mesh, h: IndexArray) -> tuple[FloatArray, FloatArray]:
     return mesh.X[mesh.origin[h], :3], mesh.X[mesh.origin[following], :3]
 
 
+def _corners(mesh: Mesh, faces: IndexArray) -> Offenders:
+    vertices = np.unique(mesh.origin.reshape(-1, 3)[faces])
+    return Offenders(np.empty((0, 3)), vertices.astype(np.int32))
+
+
 class _Places:
     """Places of old flaws, and how much there was of them."""
 
@@ -71,6 +77,10 @@ class _Places:
 class FoldCheck:
     """No folds and no faces without area that were not there."""
 
+    def remember_nothing(self) -> None:
+        """Let all flaws count as new."""
+        self.folds = self.flat = _Places(np.empty((0, 3)), 0.0)
+
     def remember(self, mesh: Mesh, tree: Tree) -> None:
         """Note where the mesh is folded, and where faces have no area."""
         normals = _normals(mesh)
@@ -86,8 +96,8 @@ class FoldCheck:
         flat = self._flat_faces(mesh, normals)
         self.flat = _Places(self._middles(mesh, flat), float(len(flat)))
 
-    def offenders(self, mesh: Mesh, tree: Tree) -> FloatArray:
-        """Middles of new folded edges, and of new faces without area."""
+    def offenders(self, mesh: Mesh, tree: Tree) -> Offenders:
+        """Corners of the faces at new folded edges, and of new faces without area."""
         normals = _normals(mesh)
         h = _folded_edges(mesh, normals)
         a, b = _ends(mesh, h)
@@ -97,9 +107,10 @@ class FoldCheck:
         flat = self._flat_faces(mesh, normals)
         points = self._middles(mesh, flat)
         reach = _NEAR * mesh.X[mesh.origin[3 * flat], 3]
-        return np.concatenate(
-            [middle[is_new], points[self.flat.new(points, np.ones(len(flat)), reach)]]
-        )
+        is_new_flat = self.flat.new(points, np.ones(len(flat)), reach)
+        new = h[is_new]
+        faces = np.concatenate([new // 3, mesh.twin[new] // 3, flat[is_new_flat]])
+        return _corners(mesh, faces)
 
     @staticmethod
     def _flat_faces(mesh: Mesh, normals: FloatArray) -> IndexArray:
@@ -118,32 +129,51 @@ class CrossingCheck:
     def __init__(self, parallel: bool) -> None:
         self.parallel = parallel
 
+    def remember_nothing(self) -> None:
+        """Let all crossings count as new."""
+        self.crossings = _Places(np.empty((0, 3)), 0.0)
+
     def remember(self, mesh: Mesh, tree: Tree) -> None:
         """Note where faces cross."""
-        points, area, _ = self._crossings(mesh, tree)
+        _, points, area = self._crossings(mesh, tree)
         self.crossings = _Places(points, float(area.sum()))
 
-    def offenders(self, mesh: Mesh, tree: Tree) -> FloatArray:
-        """Middles of faces that cross others anew."""
-        points, area, lengths = self._crossings(mesh, tree)
-        return points[self.crossings.new(points, area, _NEAR * lengths)]
+    def offenders(self, mesh: Mesh, tree: Tree) -> Offenders:
+        """Corners of faces that cross others anew."""
+        faces, points, area = self._crossings(mesh, tree)
+        reach = _NEAR * mesh.X[mesh.origin[3 * faces], 3]
+        return _corners(mesh, faces[self.crossings.new(points, area, reach)])
 
-    def _crossings(self, mesh: Mesh, tree: Tree) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Middles, areas and target lengths of the faces that cross others."""
+    def _crossings(self, mesh: Mesh, tree: Tree) -> tuple[IndexArray, FloatArray, FloatArray]:
+        """Return the faces that cross others, their middles and areas."""
         found = crossing_faces(tree, self.parallel)
         corners = tree.corners[found].reshape(-1, 3, 3)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        alive = np.flatnonzero(mesh.origin[::3] != DEAD)
-        lengths = mesh.X[mesh.origin[3 * alive[found]], 3]
-        return corners.mean(axis=1), 0.5 * np.linalg.norm(normals, axis=1), lengths
+        alive = np.flatnonzero(mesh.origin[::3] != DEAD).astype(np.int32)
+        return alive[found], corners.mean(axis=1), 0.5 * np.linalg.norm(normals, axis=1)
 
 
-def has_new_flaws(before: Mesh, after: Mesh) -> int:
-    """Count folds and faces without area that one mesh has and an earlier one has not."""
-    check = FoldCheck()
+def count_new_flaws(before: Mesh, after: Mesh, parallel: bool | None) -> int:
+    """Count the folds and faces without area that a mesh has and an earlier one has not.
+
+    And the faces that cross others, unless ``parallel`` is None: to look for them takes longer.
+    """
+    checks: list[FoldCheck | CrossingCheck] = [FoldCheck()]
+    if parallel is not None:
+        checks.append(CrossingCheck(parallel))
+    count = 0
+    for check in checks:
+        # Almost always there is nothing, whatever was there before.
+        check.remember_nothing()
+        if check.offenders(after, _tree_for(check, after)).size:
+            check.remember(before, _tree_for(check, before))
+            count += check.offenders(after, _tree_for(check, after)).size
+    return count
+
+
+def _tree_for(check: FoldCheck | CrossingCheck, mesh: Mesh) -> Tree:
+    """Build the tree over a mesh that a check of crossings asks for."""
+    if isinstance(check, CrossingCheck):
+        return tree_of(mesh, check.parallel)
     nothing = np.empty((0, 3))
-    normals = _normals(after)
-    if not len(_folded_edges(after, normals)) and not len(check._flat_faces(after, normals)):
-        return 0
-    check.remember(before, Tree(nothing, nothing, nothing, nothing, nothing))  # type: ignore[arg-type]
-    return len(check.offenders(after, None))  # type: ignore[arg-type]
+    return Tree(nothing, *(np.empty(0, np.int32),) * 2, nothing, np.empty(0, np.int64))

@@ -7,7 +7,7 @@ said by checks: each remembers a mesh, and names places where a later mesh is no
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -21,16 +21,31 @@ from ..core.vocabulary import (
     PINNED,
     BoolArray,
     FloatArray,
+    IndexArray,
     Mesh,
     Tree,
 )
 from ..reference.bvh import build_tree, closest_faces
 from .work import Work
 
-__all__ = ["Check", "Guard", "HoldingGuard", "tree_of"]
+__all__ = ["Check", "Guard", "HoldingGuard", "Offenders", "tree_of"]
 
-# Times that a sweep is tried, with more of the mesh held each time, before it is left out.
-_ATTEMPTS = 8
+# Rings of faces that are held around what is wrong, in every attempt; then a sweep is left out.
+_RINGS = (0, 1, 1, 2, 2, 3, 4, 6, 8, 12)
+
+
+class Offenders(NamedTuple):
+    """Where a mesh is not good."""
+
+    points: FloatArray  # (k, 3) places
+    vertices: (
+        IndexArray  # (j,) vertices of the changed mesh, which may say better where this came from
+    )
+
+    @property
+    def size(self) -> int:
+        """Number of places and vertices."""
+        return len(self.points) + len(self.vertices)
 
 
 class Check(Protocol):
@@ -39,8 +54,8 @@ class Check(Protocol):
     def remember(self, mesh: Mesh, tree: Tree) -> None:
         """Take in a compact mesh, and the tree over its faces, before it is changed."""
 
-    def offenders(self, mesh: Mesh, tree: Tree) -> FloatArray:
-        """Return the places (k, 3) where the changed mesh is not good; the tree is over its faces."""
+    def offenders(self, mesh: Mesh, tree: Tree) -> Offenders:
+        """Return where the changed mesh is not good; the tree is over its faces."""
 
 
 class Guard:
@@ -75,13 +90,13 @@ class HoldingGuard(Guard):
                 check.remember(work.mesh, tree)
         held = np.zeros(len(work.mesh.X), np.bool_)
         counts = dict(monitor.counts[-1])
-        for attempt in range(_ATTEMPTS):
+        for attempt in range(len(_RINGS)):
             monitor.counts[-1] = dict(counts)
             trial = work.trial()
             yield trial
             with monitor.watch.time("guard"):
                 offenders = self._offenders(trial.mesh)
-                if not len(offenders):
+                if not offenders.size:
                     _release(trial.mesh, held)
                     work.adopt(trial)
                     return
@@ -94,18 +109,24 @@ class HoldingGuard(Guard):
             name: 0 for name in ("collapse", "flip") if name not in counts
         }
 
-    def _offenders(self, mesh: Mesh) -> FloatArray:
+    def _offenders(self, mesh: Mesh) -> Offenders:
         tree = tree_of(mesh, self.parallel)
-        return np.concatenate([check.offenders(mesh, tree) for check in self.checks])
+        found = [check.offenders(mesh, tree) for check in self.checks]
+        return Offenders(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
-    def _hold(self, mesh: Mesh, tree: Tree, offenders: FloatArray, attempt: int) -> BoolArray:
-        """Hold a compact mesh around points, and as many rings of faces more; returns what is new."""
-        anywhere = np.full(len(offenders), NONE, np.int32)
-        faces, _ = closest_faces(tree, offenders, anywhere, 0.0, self.parallel)
+    def _hold(self, mesh: Mesh, tree: Tree, offenders: Offenders, attempt: int) -> BoolArray:
+        """Hold a compact mesh around offenders, and rings of faces more; returns what is new.
+
+        Trials keep the numbers of vertices, so these say where an offender came from even on a thin
+        part, the other side of which may be closer.
+        """
+        anywhere = np.full(len(offenders.points), NONE, np.int32)
+        faces, _ = closest_faces(tree, offenders.points, anywhere, 0.0, self.parallel)
         F = mesh.origin.reshape(-1, 3)
         is_held = np.zeros(len(mesh.X), np.bool_)
         is_held[F[faces]] = True
-        for _ in range(attempt):
+        is_held[offenders.vertices] = True
+        for _ in range(_RINGS[attempt]):
             is_held[F[is_held[F].any(axis=1)]] = True
         _agree_across_sheets(mesh, is_held)
         inner, on_curve = is_held & (mesh.kind == INNER), is_held & (mesh.kind == CURVE)
