@@ -289,7 +289,8 @@ def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--avoid-intersections",
-        action="store_true",
+        action=argparse.BooleanOptionalAction,
+        default=None,
         help="let no face cross another that did not cross one in the input",
     )
     group.add_argument("--threads", type=_at_least_one, metavar="N", help="number of threads")

@@ -59,10 +59,12 @@ class _Places:
     """Places of old flaws, and how much there was of them."""
 
     def __init__(self, points: FloatArray, amount: float) -> None:
-        from scipy.spatial import cKDTree
-
-        self.tree = cKDTree(points) if len(points) else None
+        self.tree = None
         self.amount = amount
+        if len(points):
+            from scipy.spatial import cKDTree
+
+            self.tree = cKDTree(points)
 
     def new(self, points: FloatArray, amounts: FloatArray, reach: FloatArray) -> BoolArray:
         """Which flaws are new ones: all, where there is more of them than before, beside old ones."""
