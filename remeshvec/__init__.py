@@ -12,6 +12,7 @@ from .errors import (
     MeshInputError,
     OptionError,
     RemeshvecError,
+    RemeshWarning,
     SingularSystemError,
     WorkerError,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "OptionError",
     "Quality",
     "RemeshResult",
+    "RemeshWarning",
     "RemeshvecError",
     "Report",
     "SingularSystemError",

@@ -7,6 +7,7 @@ __all__ = [
     "MeshFormatError",
     "MeshInputError",
     "OptionError",
+    "RemeshWarning",
     "RemeshvecError",
     "SingularSystemError",
     "WorkerError",
@@ -15,6 +16,10 @@ __all__ = [
 
 class RemeshvecError(Exception):
     """Base of every exception that remeshvec raises on purpose."""
+
+
+class RemeshWarning(UserWarning):
+    """A result does not keep a bound that was asked for; the message has the numbers."""
 
 
 class MeshInputError(RemeshvecError, ValueError):

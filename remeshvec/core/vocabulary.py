@@ -19,6 +19,7 @@ __all__ = [
     "HALTED",
     "HELD",
     "INNER",
+    "LARGEST_MESH",
     "MAX_VALENCE",
     "NONE",
     "NON_MANIFOLD",
@@ -46,6 +47,9 @@ FROZEN = -2  # locked: never split, collapsed or flipped
 HALTED = -3  # locked until the end of the sweep
 # Added to the name of a non-manifold edge, whose siblings on other sheets must change as it does.
 NON_MANIFOLD = 1 << 30
+
+# Faces of the largest mesh: half-edges that are names of curves lie below `NON_MANIFOLD`.
+LARGEST_MESH = (NON_MANIFOLD - 1) // 3
 
 # Kinds of vertices, from free to fixed; a collapse keeps the larger kind.
 INNER = 0  # moves freely

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import partial
 from typing import Any
 
@@ -14,7 +15,8 @@ from ..core.compiler import compile_notice
 from ..core.lazy import Lazy, LazyRecipe
 from ..core.stopwatch import Stopwatch
 from ..core.threads import thread_scope
-from ..errors import OptionError
+from ..core.vocabulary import LARGEST_MESH
+from ..errors import MeshInputError, OptionError, RemeshWarning
 from ..input.constraints import Constraints, make_constraints
 from ..input.options import RemeshOptions
 from ..input.prepare import prepare
@@ -41,6 +43,7 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
         function(options.callback, "callback")
     with watch.time("check"):
         vertices, faces = as_mesh(V, F)
+        _check_number(len(vertices), len(faces))
         constraints = make_constraints(len(vertices), faces, options)
     with compile_notice(), thread_scope(recipe.threads) as may_run_parallel:
         with watch.time("build"):
@@ -54,6 +57,8 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
         job = Job(prepared, constraints, vertices, sizing, recipe, monitor, may_run_parallel)
         del prepared  # it holds the mesh of the input
         done = job.run_once() if wanted is None else meet_count(job, *wanted)
+        if wanted is None:
+            _check_max_faces(done.count("faces"), sizing.max_faces, done.length)
         out = _extract(job, done, constraints, len(faces), np.asarray(F).dtype)
         with watch.time("extract"):
             V2 = out.V.astype(_vertex_dtype(V), copy=False)
@@ -64,7 +69,31 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
         done.featured.counts, done.deviation, before=before, after=(V2, out.F),
         turned=LazyRecipe(partial(turned_faces, out.provenance)),
     )  # fmt: skip
+    if done.missed and recipe.max_deviation is not None:
+        warnings.warn(
+            f"{done.missed}; a shorter L, more sweeps (iterations) or a larger bound may help",
+            RemeshWarning,
+            stacklevel=3,
+        )
     return _result(V2, out, report)
+
+
+def _check_number(n: int, m: int) -> None:
+    """Refuse meshes whose half-edges have no room in 32 bits."""
+    if m > LARGEST_MESH or n > 3 * LARGEST_MESH:
+        raise MeshInputError(
+            f"V, F have {n:,} vertices and {m:,} faces; at most {3 * LARGEST_MESH:,} and "
+            f"{LARGEST_MESH:,} fit into 32-bit indices: cut the mesh into parts"
+        )
+
+
+def _check_max_faces(n_faces: int, max_faces: int, length: float) -> None:
+    if n_faces > max_faces:
+        raise OptionError(
+            f"L = {length:g} gave {n_faces:,} faces, more than max_faces = {max_faces:,}: long thin "
+            "faces, small parts, or faces and edges that must stay, need more than the area; raise L "
+            "or max_faces"
+        )
 
 
 def _extract(

@@ -95,7 +95,8 @@ def remesh(
         Largest ratio of the target lengths at the ends of an edge, where ``L`` varies.
     max_deviation : float, optional
         Largest distance between input and result, both ways, in the units of ``V``. Edges become
-        shorter than ``L`` where that needs it. See ``report.deviation`` for what was measured.
+        shorter than ``L`` where that needs it. See ``report.deviation`` for what was measured; a
+        `RemeshWarning` says where the bound is not met.
     feature_angle : "auto", float or None
         Which creases to keep. ``"auto"``: those that turn more than their surroundings at the scale of
         ``L``, so that a part keeps its edges and a scan does not freeze its noise. Degrees: all edges
@@ -147,7 +148,8 @@ def remesh(
         Stop after a sweep that changed less than this share of the edges and moved vertices by less
         than ``tol * L`` (root mean square). By default all sweeps are run.
     max_faces : int
-        An ``L`` that would give more faces than this is refused before any work.
+        An ``L`` that would give more faces than this is refused: before any work where the area says
+        so, else before the splits that lead too far, or at the end.
     threads : int, optional
         Threads to use at most; all by default. Meshes below 50,000 faces use one.
     callback : callable, optional
@@ -166,6 +168,11 @@ def remesh(
         The arrays cannot be a triangle mesh.
     OptionError
         An option cannot work.
+
+    Warns
+    -----
+    RemeshWarning
+        The result does not keep ``max_deviation``.
 
     References
     ----------

@@ -12,7 +12,8 @@ from functools import wraps
 import numpy as np
 
 from ..core.vocabulary import DEAD, FloatArray, Mesh
-from ..operations.classify import classify_edges
+from ..errors import OptionError
+from ..operations.classify import EdgeFlags, classify_edges
 from ..operations.collapse import collapse_short_edges
 from ..operations.flip import flip_edges
 from ..operations.project import project_vertices, read_lengths
@@ -66,6 +67,7 @@ def split(work: Work, sweep: Sweep) -> None:
     for _ in range(MAX_ROUNDS):
         mesh, blocks = work.mesh, work.blocks
         flags = classify_edges(mesh, blocks, factor, shortest, work.is_parallel)
+        _check_room(work, flags)
         siblings = None
         if work.featured.on_non_manifold is not None:
             siblings = find_non_manifold_edges(mesh)
@@ -78,6 +80,26 @@ def split(work: Work, sweep: Sweep) -> None:
     else:
         work.flags = classify_edges(work.mesh, work.blocks, factor, shortest, work.is_parallel)
     work.monitor.counts[-1]["split"] = count
+
+
+def _check_room(work: Work, flags: EdgeFlags) -> None:
+    """Refuse splits that would make more faces than the plan allows.
+
+    An edge makes two; most are counted twice, by both of their faces.
+
+    Raises
+    ------
+    OptionError
+    """
+    n_faces = work.n_faces - flags.n_gone
+    n_after = n_faces + flags.n_long
+    if n_after > work.plan.most_faces:
+        sweep = len(work.monitor.counts)
+        raise OptionError(
+            f"sweep {sweep} would split {n_faces:,} faces into about {n_after:,}, too many for "
+            f"max_faces = {work.plan.max_faces:,}: long thin faces, or edges that must stay, need "
+            "many more faces than the area; raise L or max_faces, or mend these faces"
+        )
 
 
 def _split_factor(work: Work, sweep: Sweep) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, radians
 
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import LARGEST_MESH, FloatArray
 from ..input.recipe import Recipe
 from ..operations.collapse import CollapseLimits
 from ..operations.flip import FlipLimits
@@ -48,6 +48,8 @@ class Plan:
     scale: float = 1.0  # of the frame that the mesh comes in
     gradation: float = float("inf")  # largest ratio of the lengths at the ends of an edge
     adaptation: Adaptation | None = None  # None where lengths do not follow from the curvature
+    max_faces: int = LARGEST_MESH  # that the caller allows in a result
+    most_faces: int = LARGEST_MESH  # on the way to it
 
     @property
     def max_deviation(self) -> float | None:
