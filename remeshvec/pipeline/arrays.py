@@ -105,9 +105,7 @@ def _extract(
     barycentric = None
     if _ends_on_input(recipe):
         with watch.time("locate"):
-            barycentric = locate(
-                done.mesh, done.featured.reference, not recipe.fit_rounds, parallel
-            )
+            barycentric = locate(done.mesh, done.featured.reference, done.is_on_input, parallel)
     with watch.time("extract"):
         return extract(
             done.mesh,

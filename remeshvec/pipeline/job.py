@@ -60,6 +60,7 @@ class Remeshed:
 
     mesh: Mesh
     is_compact: bool
+    is_on_input: bool  # whether all vertices were projected last
     featured: FeaturedReference
     length: float  # of the mean new edge, in the units of the input
     counts: list[dict[str, int]]  # of every sweep
@@ -136,6 +137,7 @@ class Job:
         return Remeshed(
             work.mesh,
             is_compact,
+            not (work.was_guarded or self.recipe.fit_rounds),
             featured,
             length / self.prepared.scale,
             monitor.counts,

@@ -102,6 +102,7 @@ class HoldingGuard(Guard):
                     return
                 if monitor.is_cancelled:
                     break
+                work.was_guarded = True
                 held |= self._hold(work.mesh, tree, offenders, attempt)
         _release(work.mesh, held)
         work.step = np.inf

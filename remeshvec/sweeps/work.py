@@ -47,6 +47,8 @@ class Work:
         Whether elements must keep their numbers, because something else refers to them.
     is_calm : bool
         Whether all that is left to split and collapse is the same few edges, again and again.
+    was_guarded : bool
+        Whether parts of the mesh were held in some sweep, and may lie off the input.
     varies : bool
         Whether target lengths vary.
     """
@@ -68,6 +70,7 @@ class Work:
         self.before: FloatArray | None = None
         self.keeps_numbers = False
         self.is_calm = False
+        self.was_guarded = False
         self.varies = bool(np.ptp(mesh.X[:, 3]) > 0.0)
 
     def put(self, mesh: Mesh) -> None:
