@@ -159,7 +159,8 @@ class Job:
         if not n_flaws:
             return work, stop, 0
         counts = monitor.counts
-        checks = FoldCheck(), CrossingCheck(self.parallel)
+        crossings = CrossingCheck(self.parallel, self.recipe.avoid_intersections)
+        checks = FoldCheck(self.parallel), crossings
         other, other_stop = self._guarded(before.copy(), featured, checks)
         n_left = self._count_flaws(before, other.mesh)
         if not monitor.is_cancelled and n_left < n_flaws:
@@ -169,8 +170,7 @@ class Job:
 
     def _count_flaws(self, before: Mesh, after: Mesh) -> int:
         """Count the flaws that sweeps have made."""
-        parallel = self.parallel if self.recipe.avoid_intersections else None
-        return count_new_flaws(before, after, parallel)
+        return count_new_flaws(before, after, self.recipe.avoid_intersections, self.parallel)
 
     def _guarded(
         self, mesh: Mesh, featured: FeaturedReference, checks: tuple[Check, ...]
@@ -180,7 +180,7 @@ class Job:
         work = Work(mesh, featured, self.plan, self.monitor, self.may_run_parallel)
         bound = self.plan.max_deviation
         if bound is not None:
-            checks = (DeviationCheck(featured, bound, work.is_parallel), *checks)
+            checks = (*checks, DeviationCheck(featured, bound, work.is_parallel))
         guard = HoldingGuard(checks, work.is_parallel) if checks else Guard()
         stop = run_sweeps(work, make_schedule(self.recipe), guard)
         if has_finish(work):

@@ -8,41 +8,26 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.vocabulary import DEAD, BoolArray, FloatArray, IndexArray, Mesh, Tree
+from ..mesh.blocks import make_blocks
+from ..operations.folds import area_vectors, find_flat_faces, find_folds, has_folds
 from ..reference.crossings import crossing_faces
 from .guard import Offenders, tree_of
 
 __all__ = ["CrossingCheck", "FoldCheck", "count_new_flaws"]
 
-# Cosine of a turn of 150 degrees, from which on an edge counts as folded.
-_FOLDED = -0.8660254037844387
-
-# Faces with less than this share of the mean area have none.
-_NO_AREA = 1e-12
+# For checks that ask no tree.
+NO_TREE = Tree(
+    np.empty((0, 9)),
+    np.empty(0, np.int32),
+    np.empty(0, np.int32),
+    np.empty((0, 6)),
+    np.zeros(1, np.int64),
+)
 
 # New flaws within so many target lengths of old ones are the old ones, moved; ...
 _NEAR = 1.0
 # ... as long as there is not so much more of them in all.
 _GROWTH = 1.02
-
-
-def _normals(mesh: Mesh) -> FloatArray:
-    """Area vectors of all faces (m, 3); nothing for removed ones."""
-    F = mesh.origin.reshape(-1, 3)
-    a, b, c = (mesh.X[F[:, i], :3] for i in range(3))
-    n = np.cross(b - a, c - a)
-    n[F[:, 0] == DEAD] = 0.0
-    return np.asarray(n)
-
-
-def _folded_edges(mesh: Mesh, normals: FloatArray) -> IndexArray:
-    """Half-edges, one per edge, where the surface turns by more than 150 degrees."""
-    h = np.flatnonzero((mesh.twin > np.arange(len(mesh.twin))) & (mesh.origin != DEAD))
-    n, m = normals[h // 3], normals[mesh.twin[h] // 3]
-    dot = np.einsum("ij,ij->i", n, m)
-    far = dot < 0.0
-    h, n, m, dot = h[far], n[far], m[far], dot[far]
-    size = np.linalg.norm(n, axis=1) * np.linalg.norm(m, axis=1)
-    return h[dot < _FOLDED * size].astype(np.int32)
 
 
 def _ends(mesh: Mesh, h: IndexArray) -> tuple[FloatArray, FloatArray]:
@@ -79,14 +64,13 @@ class _Places:
 class FoldCheck:
     """No folds and no faces without area that were not there."""
 
-    def remember_nothing(self) -> None:
-        """Let all flaws count as new."""
-        self.folds = self.flat = _Places(np.empty((0, 3)), 0.0)
+    def __init__(self, parallel: bool) -> None:
+        self.parallel = parallel
 
     def remember(self, mesh: Mesh, tree: Tree) -> None:
         """Note where the mesh is folded, and where faces have no area."""
-        normals = _normals(mesh)
-        h = _folded_edges(mesh, normals)
+        vectors = area_vectors(mesh, make_blocks(mesh), self.parallel)
+        h = find_folds(mesh, vectors)
         a, b = _ends(mesh, h)
         length = np.linalg.norm(b - a, axis=1)
         # Points along the edges, no farther apart than target lengths.
@@ -95,18 +79,18 @@ class FoldCheck:
         place = np.arange(len(edge)) - np.repeat(np.cumsum(steps) - steps, steps)
         share = ((place + 0.5) / steps[edge])[:, None]
         self.folds = _Places(a[edge] + share * (b - a)[edge], float(length.sum()))
-        flat = self._flat_faces(mesh, normals)
+        flat = find_flat_faces(mesh, vectors)
         self.flat = _Places(self._middles(mesh, flat), float(len(flat)))
 
     def offenders(self, mesh: Mesh, tree: Tree) -> Offenders:
         """Corners of the faces at new folded edges, and of new faces without area."""
-        normals = _normals(mesh)
-        h = _folded_edges(mesh, normals)
+        vectors = area_vectors(mesh, make_blocks(mesh), self.parallel)
+        h = find_folds(mesh, vectors)
         a, b = _ends(mesh, h)
         middle, length = 0.5 * (a + b), np.linalg.norm(b - a, axis=1)
         reach = np.maximum(_NEAR * mesh.X[mesh.origin[h], 3], length)
         is_new = self.folds.new(middle, length, reach)
-        flat = self._flat_faces(mesh, normals)
+        flat = find_flat_faces(mesh, vectors)
         points = self._middles(mesh, flat)
         reach = _NEAR * mesh.X[mesh.origin[3 * flat], 3]
         is_new_flat = self.flat.new(points, np.ones(len(flat)), reach)
@@ -115,21 +99,16 @@ class FoldCheck:
         return _corners(mesh, faces)
 
     @staticmethod
-    def _flat_faces(mesh: Mesh, normals: FloatArray) -> IndexArray:
-        alive = mesh.origin[::3] != DEAD
-        size = np.linalg.norm(normals, axis=1)
-        return np.flatnonzero(alive & ~(size > _NO_AREA * size[alive].mean())).astype(np.int32)
-
-    @staticmethod
     def _middles(mesh: Mesh, faces: IndexArray) -> FloatArray:
         return np.asarray(mesh.X[mesh.origin.reshape(-1, 3)[faces], :3].mean(axis=1))
 
 
 class CrossingCheck:
-    """No faces that cross others and did not."""
+    """No faces that cross others and did not; faces that share a corner only with ``adjacent``."""
 
-    def __init__(self, parallel: bool) -> None:
+    def __init__(self, parallel: bool, adjacent: bool) -> None:
         self.parallel = parallel
+        self.adjacent = adjacent
 
     def remember_nothing(self) -> None:
         """Let all crossings count as new."""
@@ -148,34 +127,28 @@ class CrossingCheck:
 
     def _crossings(self, mesh: Mesh, tree: Tree) -> tuple[IndexArray, FloatArray, FloatArray]:
         """Return the faces that cross others, their middles and areas."""
-        found = crossing_faces(tree, self.parallel)
+        found = crossing_faces(tree, self.parallel, self.adjacent)
         corners = tree.corners[found].reshape(-1, 3, 3)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         alive = np.flatnonzero(mesh.origin[::3] != DEAD).astype(np.int32)
         return alive[found], corners.mean(axis=1), 0.5 * np.linalg.norm(normals, axis=1)
 
 
-def count_new_flaws(before: Mesh, after: Mesh, parallel: bool | None) -> int:
-    """Count the folds and faces without area that a mesh has and an earlier one has not.
+def count_new_flaws(before: Mesh, after: Mesh, crossings: bool, parallel: bool) -> int:
+    """Count the vertices at flaws that a mesh has and an earlier one has not.
 
-    And the faces that cross others, unless ``parallel`` is None: to look for them takes longer.
+    Crossings count only if asked for: to look for them takes longer.
     """
-    checks: list[FoldCheck | CrossingCheck] = [FoldCheck()]
-    if parallel is not None:
-        checks.append(CrossingCheck(parallel))
     count = 0
-    for check in checks:
-        # Almost always there is nothing, whatever was there before.
-        check.remember_nothing()
-        if check.offenders(after, _tree_for(check, after)).size:
-            check.remember(before, _tree_for(check, before))
-            count += check.offenders(after, _tree_for(check, after)).size
+    if has_folds(after, make_blocks(after), parallel):
+        check = FoldCheck(parallel)
+        check.remember(before, NO_TREE)
+        count += check.offenders(after, NO_TREE).size
+    if crossings:
+        among = CrossingCheck(parallel, True)
+        among.remember_nothing()
+        tree = tree_of(after, parallel)
+        if among.offenders(after, tree).size:
+            among.remember(before, tree_of(before, parallel))
+            count += among.offenders(after, tree).size
     return count
-
-
-def _tree_for(check: FoldCheck | CrossingCheck, mesh: Mesh) -> Tree:
-    """Build the tree over a mesh that a check of crossings asks for."""
-    if isinstance(check, CrossingCheck):
-        return tree_of(mesh, check.parallel)
-    nothing = np.empty((0, 3))
-    return Tree(nothing, *(np.empty(0, np.int32),) * 2, nothing, np.empty(0, np.int64))

@@ -111,9 +111,13 @@ class HoldingGuard(Guard):
         }
 
     def _offenders(self, mesh: Mesh) -> Offenders:
+        """Return what the first check finds that finds something; cheap ones come first."""
         tree = tree_of(mesh, self.parallel)
-        found = [check.offenders(mesh, tree) for check in self.checks]
-        return Offenders(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        for check in self.checks:
+            found = check.offenders(mesh, tree)
+            if found.size:
+                break
+        return found
 
     def _hold(self, mesh: Mesh, tree: Tree, offenders: Offenders, attempt: int) -> BoolArray:
         """Hold a compact mesh around offenders, and rings of faces more; returns what is new.
