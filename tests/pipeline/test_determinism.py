@@ -28,6 +28,7 @@ from data.shapes import nonmanifold
 from remeshvec.core.compiler.decorators import ThreadedKernel
 from remeshvec.core.vocabulary import FIXED, NONE
 from remeshvec.input.prepare import prepare
+from remeshvec.operations import folds
 from remeshvec.operations.bisect import bisect_edges
 from remeshvec.operations.classify import classify_edges
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
@@ -41,7 +42,9 @@ from remeshvec.operations.unfold import undo_folds
 from remeshvec.operations.untangle import approach_vertices, untangle_vertices
 from remeshvec.output import extract
 from remeshvec.reference.bvh import Surface, closest_faces
+from remeshvec.reference.crossings import crossing_faces
 from remeshvec.sizing.target_lengths import mesh_size
+from remeshvec.sweeps.guard import tree_of
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -83,6 +86,15 @@ def phases():
     yield "locate", lambda m, b, r, p: locate(m, r, b, p)
     yield "lengths", lambda m, b, r, p: read_lengths(stretched(m), b, r, p)
     yield "closest", lambda m, b, r, p: closest_faces(r.tree, *queries(m), 0.0, p)
+    yield (
+        "folds",
+        lambda m, b, r, p: (folds.find_folds(m, folds.area_vectors(m, b, p)), has(m, b, p)),
+    )
+    yield "crossings", lambda m, b, r, p: (crossing_faces(tree_of(m, False), p),)
+
+
+def has(mesh, blocks, parallel):
+    return np.array(folds.has_folds(mesh, blocks, parallel))
 
 
 def write_out(mesh, parallel):
@@ -198,7 +210,7 @@ def test_every_kernel_is_the_same_in_any_order(monkeypatch):
             changed = any(
                 not np.array_equal(*pair) for pair in zip(current, copies[0], strict=True)
             )
-            assert changed or name in ("locate", "closest", "measure"), name
+            assert changed or name in ("locate", "closest", "measure", "folds", "crossings"), name
             current = copies[0]
             assert_valid(current)
         written = in_every_way(lambda p: write_out(current, p))  # noqa: B023

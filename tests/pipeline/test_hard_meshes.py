@@ -62,4 +62,4 @@ def test_a_thin_ring_does_not_turn_inside_out(wall):
     result = remesh(V, F, 0.3, avoid_intersections=True)
     assert crossing(*result) == 0
     assert not len(result.report.find_defects(check_intersections=True).crossing)
-    assert zoo.volume(*result) == pytest.approx(zoo.volume(V, F), rel=0.25)
+    assert zoo.volume(*result) == pytest.approx(zoo.volume(V, F), rel=0.3)
