@@ -17,7 +17,9 @@ from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_copies
 from ..sizing.target_lengths import bound_gradation
 from .deviation import DeviationCheck, edges_to_refine
+from .flaws import count_new_flaws
 from .guard import Guard
+from .plan import Adaptation
 from .sheets import separate_sheets
 from .work import Work
 
@@ -98,12 +100,22 @@ def polish(work: Work) -> None:
 def refine(work: Work) -> None:
     """Bring all faces within the tolerance of adaptive lengths; nothing else asks for this.
 
-    First by moving vertices: a third of the squared length is the squared circumradius of an
-    equilateral face. Then by splits of the longest edge.
+    Where that would make folds, faces stay as they are.
     """
     if work.plan.adaptation is None:
         return
-    tolerance, recipe = work.plan.adaptation.tolerance, work.plan.recipe
+    before = work.trial()
+    _refine(work, work.plan.adaptation)
+    if count_new_flaws(before.mesh, work.mesh, False, work.is_parallel):
+        work.adopt(before)
+
+
+def _refine(work: Work, adaptation: Adaptation) -> None:
+    """Bring faces within the tolerance, first by moving vertices, then by splits of the longest edge.
+
+    A third of the squared length is the squared circumradius of an equilateral face.
+    """
+    tolerance, recipe = adaptation.tolerance, work.plan.recipe
     reference = work.featured.reference
     for _ in range(_EVENING_ROUNDS):
         if not approach_vertices(
