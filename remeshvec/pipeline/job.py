@@ -36,7 +36,7 @@ _CLOSE_ENOUGH = 0.02
 _WAYS = {"to_input": "from the result to the input", "from_input": "from the input to the result"}
 
 # On the way a mesh may have so many times the faces that are allowed in the end, or that it had: first
-# splits also cut edges that are collapsed afterwards, on parts of few long faces into 7 times as many
+# splits also cut edges that are collapsed afterwards, on parts of few long faces into 14 times as many
 # (102 calls on real meshes). Beyond 10 million faces, about 1 GB, that is too much memory to lend.
 _ON_THE_WAY = 32
 _LENT = 10_000_000
