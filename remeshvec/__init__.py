@@ -19,6 +19,7 @@ from .errors import (
 from .files.mesh_files import MeshFile, read_mesh, write_mesh
 from .measures.distance import SurfaceDistance, surface_distance
 from .measures.quality import Quality, quality
+from .output.defects import Defects
 from .output.report import Report
 from .output.result import RemeshResult
 from .pipeline.remesh import remesh
@@ -39,6 +40,7 @@ __all__ = [
     "Adaptive",
     "BatchError",
     "BatchItem",
+    "Defects",
     "EditedSurface",
     "Editor",
     "LaplacianSolver",

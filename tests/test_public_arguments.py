@@ -44,7 +44,14 @@ from remeshvec import (
 
 V, F = zoo.grid(3, 3)  # 9 vertices, 8 faces
 MESH = (V, F)
-RECORDS = {"BatchItem", "MeshFile", "Quality", "Report", "SurfaceDistance"}  # made by the library
+RECORDS = {
+    "BatchItem",
+    "Defects",
+    "MeshFile",
+    "Quality",
+    "Report",
+    "SurfaceDistance",
+}  # made by the library
 
 NOT_FLAGS = [value for value in NOT_FLAGS_OR_NONE if value is not None]
 NOT_VERTICES = [
