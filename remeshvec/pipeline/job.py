@@ -232,7 +232,7 @@ def _in_words(stop: Stop, tol: float | None, n_flaws: int) -> str:
             f"vertices by less than {tol:g} L"
         )
     if n_flaws:
-        words += f"; {n_flaws} folds or flat faces are new, see report.defects"
+        words += f"; new flaws at {n_flaws} vertices, see report.defects"
     return words
 
 
