@@ -23,7 +23,7 @@ def crossing_faces(tree: Tree, parallel: bool, adjacent: bool = True) -> IndexAr
 
     Faces that touch, or lie in one plane, do not cross. Two faces that share a corner cross where they
     meet elsewhere too [Moeller 1997; here by signed volumes]; without ``adjacent``, only faces that
-    share none are looked at, in a third of the time.
+    share none are looked at, which is faster.
     """
     marks = np.zeros(len(tree.corners), np.uint8)
     _find_crossings(parallel, tree, adjacent, marks)
