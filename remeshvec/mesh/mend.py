@@ -18,7 +18,7 @@ from ..core.compiler import inlined, threaded
 from ..core.geometry import face_vector, point, squared_length
 from ..core.ranges import even_ranges, per_range
 from ..core.vocabulary import BoolArray, FloatArray, IndexArray
-from .edges import components
+from .edges import components, used_vertices
 from .morton import MeshFrame
 from .repair import drop_degenerate_faces, drop_duplicate_faces
 
@@ -96,7 +96,11 @@ def mend_faces(
             break
         now = after
         marks = _mark_faces(V, now.F, tolerance, parallel)
-    return None if now.F is F or not len(now.F) else now
+    if now.F is F or not len(now.F):
+        return None
+    # A wall thinner than the tolerance goes with its vertices; if one of them must stay, all stays.
+    lost = used_vertices(F, len(V)) & ~used_vertices(now.F, len(V)) & kept.vertices
+    return None if lost.any() else now
 
 
 def _numbers(n: int) -> IndexArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.vocabulary import NONE, Mesh
+from ..core.vocabulary import FROZEN, NONE, Mesh
 from ..mesh.blocks import make_blocks
 from ..mesh.repair import weld_vertices
 from ..operations.split import split_edges
@@ -29,7 +29,8 @@ def separate_sheets(mesh: Mesh, featured: FeaturedReference) -> Mesh:
     a, b = target[ends[0][h]].astype(np.int64), target[ends[1][h]].astype(np.int64)
     keys = np.minimum(a, b) * len(mesh.X) + np.maximum(a, b)
     _, place, count = np.unique(keys, return_inverse=True, return_counts=True)
-    doubled = (count[place] > 1) & (mesh.twin[h] != NONE)
+    # What must stay is as it was in the input, whatever runs beside it.
+    doubled = (count[place] > 1) & (mesh.twin[h] != NONE) & (mesh.curve[h] != FROZEN)
     if not doubled.any():
         return mesh
     return split_edges(mesh, make_blocks(mesh), h[doubled].astype(np.int32), False)
