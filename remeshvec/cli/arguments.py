@@ -291,7 +291,7 @@ def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
         "--avoid-intersections",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="let no face cross another that did not cross one in the input",
+        help="hold the mesh where faces would come to cross others",
     )
     group.add_argument("--threads", type=_at_least_one, metavar="N", help="number of threads")
 

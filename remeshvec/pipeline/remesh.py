@@ -142,8 +142,9 @@ def remesh(
         Let vertices leave the input by up to 0.2 L so that faces straddle it: less RMS
         distance. On in ``"fine"``.
     avoid_intersections : bool
-        Let no face cross another that did not cross one in the input. The mesh stays as it was where
-        that would happen; such calls take many times as long.
+        Hold the mesh where faces would come to cross others. ``report.stop`` says where this was not
+        enough; parts that touch in the input may still cross by rounding. Such calls take many times
+        as long.
     tol : float, optional
         Stop after a sweep that changed less than this share of the edges and moved vertices by less
         than ``tol * L`` (root mean square). By default all sweeps are run.

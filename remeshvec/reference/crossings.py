@@ -63,8 +63,7 @@ def _mark_crossed(tree, f, adjacent, stack, marks):
             continue
         start = tree.level[d - 1]
         end = min(start + ARITY * i + ARITY, tree.level[d])
-        # Boxes of earlier faces alone are left out: the last face of box k on level d - 1 comes before
-        # (k + 1) times the faces of such a box.
+        # Boxes of earlier faces alone are left out.
         first = f // (LEAF * np.int64(ARITY) ** (d - 1))
         for j in range(start + max(ARITY * i, first), end):
             if _box_meets(tree.boxes, j, low, high):
