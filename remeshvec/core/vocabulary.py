@@ -53,9 +53,9 @@ LARGEST_MESH = (NON_MANIFOLD - 1) // 3
 
 # Kinds of vertices, from free to fixed; a collapse keeps the larger kind.
 INNER = 0  # moves freely
-HELD = 1  # inner, but held by the sweeps: the tip of a horn, or where moves lead too far
+HELD = 1  # inner, but held: a tip, or for a sweep where moves lead too far
 CURVE = 2  # slides along its feature curve: a crease, the boundary, a border between labels
-PINNED = 3  # on a curve, and held by the sweeps
+PINNED = 3  # on a curve, and held for a sweep
 FIXED = 4  # a vertex of the input that never moves and never vanishes
 
 # Where the caller names no length, the target length is this many mean edges.
@@ -90,7 +90,7 @@ class Mesh(NamedTuple):
     vertex_halfedge : (n,) int32
         One outgoing half-edge; for a boundary vertex the one without twin; ``DEAD`` if removed.
     valence_excess : (n,) int32
-        Valence minus 6, or minus 4 on the boundary.
+        Valence minus the ideal one: 6, or 4 on the boundary, or what suits the angle at a held tip.
     X : (n, 4) float64
         Coordinates, and in the last column the target edge length.
     kind : (n,) uint8

@@ -14,7 +14,6 @@ from ..core.vocabulary import (
     CURVE,
     FIXED,
     FROZEN,
-    HELD,
     INNER,
     NON_MANIFOLD,
     NONE,
@@ -28,7 +27,7 @@ from ..features.creases import find_creases, least_turn
 from ..features.curves import link_chains
 from ..features.dihedral import find_dihedral_angles
 from ..features.polyline import find_siblings, join_edges, measure_arcs, name_edges
-from ..features.tips import LEAST_TURN, find_tips
+from ..features.tips import LEAST_TURN, hold_tips
 from ..input.constraints import ConstraintMasks
 from ..mesh.walk import ends_of, next_halfedge
 from .bvh import Surface
@@ -100,7 +99,7 @@ def build_reference(
     _mark(mesh, curves.edges, fixed)
     mesh.curve[members] += NON_MANIFOLD
     mesh.curve[marks.frozen] = FROZEN
-    mesh.kind[find_tips(mesh, turns)] = HELD
+    hold_tips(mesh, turns)
     X = mesh.X.copy()
     arcs = measure_arcs(X, origin, names, curve_neighbours)
     if marks.held is not None:

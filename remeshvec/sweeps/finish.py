@@ -6,7 +6,6 @@ from math import cos, radians
 
 import numpy as np
 
-from ..core.vocabulary import CURVE, HELD, INNER, PINNED
 from ..operations.fit import fit_vertices
 from ..operations.flip import FlipLimits, flip_edges
 from ..operations.project import project_vertices
@@ -55,7 +54,6 @@ def finish(work: Work, guard: Guard) -> None:
     watch = work.monitor.watch
     with watch.time("extract"):
         work.compact()
-        _let_go(work)
         if work.featured.on_non_manifold is not None:
             work.put(separate_sheets(work.mesh, work.featured))
     with watch.time("finish"):
@@ -65,13 +63,6 @@ def finish(work: Work, guard: Guard) -> None:
         if np.ptp(work.mesh.X[:, 3]) > 0.0:
             copies = non_manifold_copies(work.mesh, work.featured)
             bound_gradation(work.mesh, work.plan.gradation, copies)
-
-
-def _let_go(work: Work) -> None:
-    """Let vertices move again that were held for the sweeps."""
-    kind = work.mesh.kind
-    kind[kind == HELD] = INNER
-    kind[kind == PINNED] = CURVE
 
 
 def polish(work: Work) -> None:

@@ -5,9 +5,9 @@ import pytest
 from helpers import naive, zoo
 from helpers.structure import built
 
-from remeshvec.core.vocabulary import FIXED
+from remeshvec.core.vocabulary import CURVE, FIXED, HELD
 from remeshvec.features.dihedral import find_dihedral_angles
-from remeshvec.features.tips import LEAST_TURN, find_tips
+from remeshvec.features.tips import LEAST_TURN, find_tips, hold_tips
 
 
 def tips_of(mesh, degrees=LEAST_TURN):
@@ -23,6 +23,38 @@ def test_apexes_are_tips():
     assert apexes_of(V, F, 0.5).tolist() == [24]
     assert len(apexes_of(*zoo.icosphere(), 0.1)) == 0
     assert len(apexes_of(*zoo.cube(), 0.1)) == 0  # a defect of 90 degrees
+
+
+def on_a_rim(height):
+    """Cone whose rim is a crease, as the features leave it."""
+    mesh = built(*zoo.bipyramid(24, top=height, bottom=0.0), length=0.1)
+    mesh.kind[:24] = CURVE
+    return mesh
+
+
+@pytest.mark.parametrize(("height", "is_tip"), [(0.8, True), (0.5, False)])
+def test_wide_cones_have_tips_too(height, is_tip):
+    """A defect of 79 or 38 degrees."""
+    assert (24 in tips_of(on_a_rim(height))) == is_tip
+
+
+def test_a_spike_on_a_surface_that_cannot_be_unrolled_is_no_tip():
+    V, F = zoo.icosphere(2)
+    V[20] *= 1.2
+    mesh = built(V, F, length=0.01)
+    assert 60 < defects(mesh)[20] < 110
+    assert len(tips_of(mesh)) == 0
+
+
+@pytest.mark.parametrize(("height", "ideal"), [(10.0, 3), (1.2, 4), (0.7, 5)])
+def test_faces_at_a_tip_share_its_angle(height, ideal):
+    mesh = on_a_rim(height)
+    before = mesh.valence_excess.copy()
+    turns = find_dihedral_angles(mesh.X, mesh.origin, mesh.twin, LEAST_TURN, False)
+    hold_tips(mesh, turns)
+    assert np.flatnonzero(mesh.kind == HELD).tolist() == [24]
+    assert mesh.valence_excess[24] == before[24] + 6 - ideal == 24 - ideal
+    assert np.array_equal(np.delete(mesh.valence_excess, 24), np.delete(before, 24))
 
 
 def test_apexes_keep_apart():

@@ -267,7 +267,8 @@ def assert_valid(mesh: Mesh, slits: bool = False) -> None:
         assert not open_ones or open_ones == [start], f"boundary vertex {v} starts inside"
         assert walk(origin, twin, start) == sorted(leaving), f"vertex {v} is no single fan"
         valence = len(leaving) + len(open_ones)
-        assert mesh.valence_excess[v] == valence - (4 if open_ones else 6), f"valence of {v}"
+        ideal = [4] if open_ones else [3, 4, 5, 6] if mesh.kind[v] == HELD else [6]
+        assert valence - mesh.valence_excess[v] in ideal, f"valence of {v}"
         at_curve = sum(on_curve[h] for h in leaving) + len(open_ones)
         assert at_curve == 2 or mesh.kind[v] != CURVE, f"vertex {v} ends or joins curves"
         kinds = (CURVE, FIXED) if at_curve else (INNER, HELD, FIXED)

@@ -28,7 +28,9 @@ def moved(name, amount, seed=0, upsample=0, **features):
     V, F = zoo.upsampled(*zoo.ZOO[name].make(), n=upsample, noise=0.0)
     mesh = built(V, F, ordered=True)
     reference = referenced(mesh, zoo.mean_edge(V, F), **features)
-    mesh.kind[mesh.kind == HELD] = INNER
+    tips = np.flatnonzero(mesh.kind == HELD)
+    mesh.kind[tips] = INNER
+    mesh.valence_excess[tips] = np.bincount(mesh.origin)[tips] - 6
     noise = np.random.default_rng(seed).normal(size=(len(mesh.X), 3))
     free = mesh.kind != FIXED
     mesh.X[free, :3] += amount * zoo.mean_edge(V, F) * noise[free]

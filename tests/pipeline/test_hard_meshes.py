@@ -63,3 +63,14 @@ def test_a_thin_ring_does_not_turn_inside_out(wall):
     assert crossing(*result) == 0
     assert not len(result.report.find_defects(check_intersections=True).crossing)
     assert zoo.volume(*result) == pytest.approx(zoo.volume(V, F), rel=0.3)
+
+
+@pytest.mark.parametrize("height", [0.8, 3.0, 10.0])
+def test_cones_keep_their_tips(height):
+    """They were let go for the last phase, which cut off up to 1.4 L."""
+    V, F = zoo.bipyramid(24, top=height, bottom=0.0)
+    result = remesh(V, F, 0.2)
+    assert (V[24] == result.V).all(axis=1).any()
+    assert not result.report.defects.folds.size
+    at_tip = result.V[result.F[(result.V[result.F] == V[24]).all(axis=2).any(axis=1)]]
+    assert 3 <= len(at_tip) <= 5
