@@ -19,9 +19,10 @@ from ..sizing.adaptive import Adaptive
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
 from ..sweeps.deviation import DeviationCheck
 from ..sweeps.finish import finish, has_finish, measure_deviation
-from ..sweeps.flaws import CrossingCheck, FoldCheck, count_new_flaws
+from ..sweeps.flaws import CrossingCheck, FoldCheck, count_new_crossings, count_new_flaws
 from ..sweeps.guard import Check, Guard, HoldingGuard
 from ..sweeps.loop import Stop, run_sweeps
+from ..sweeps.mending import mend_folds
 from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Adaptation, Plan, make_schedule
 from ..sweeps.work import Work, is_large
@@ -78,6 +79,17 @@ class Remeshed:
         return 0 if self.featured.held is None else int(self.featured.held.sum())
 
 
+@dataclass(frozen=True)
+class Swept:
+    """A mesh after the sweeps."""
+
+    work: Work
+    stop: Stop
+    counts: list[dict[str, int]]
+    n_flaws: int  # vertices at flaws that the mesh did not have before
+    n_crossings: int = 0  # vertices of faces that cross others and did not, where they were counted
+
+
 class Job:
     """One prepared mesh, to be remeshed with one length or several."""
 
@@ -130,7 +142,8 @@ class Job:
         with monitor.watch.time("reference"):
             featured, length = self._build_reference(meshes[0], L)
         before = meshes[0].copy()
-        work, stop, n_flaws = self._without_flaws(meshes.pop(), before, featured)
+        swept = self._without_flaws(meshes.pop(), before, featured)
+        work, stop, n_flaws = swept.work, swept.stop, swept.n_flaws
         is_compact = has_finish(work)
         deviation = measure_deviation(work)
         missed = _missed(deviation, self.recipe.max_deviation, self.sizing.L)
@@ -146,35 +159,56 @@ class Job:
             missed,
         )
 
-    def _without_flaws(
-        self, mesh: Mesh, before: Mesh, featured: FeaturedReference
-    ) -> tuple[Work, Stop, int]:
-        """Sweep over a mesh; where that makes flaws, again over a copy from before, with a guard.
+    def _without_flaws(self, mesh: Mesh, before: Mesh, featured: FeaturedReference) -> Swept:
+        """Sweep over a mesh, with care where that makes flaws: most meshes are done after one look."""
+        best = self._swept(mesh, before, featured, ())
+        if best.n_flaws:
+            best = self._with_care(best, before, featured)
+        self.monitor.counts = best.counts
+        return replace(best, stop=Stop.CANCELLED) if self.monitor.is_cancelled else best
 
-        Returns the better work, why its sweeps ended, and how many flaws are left.
+    def _with_care(self, best: Swept, before: Mesh, featured: FeaturedReference) -> Swept:
+        """Mend the flaws, or sweep again from before with a guard; returns the best of all.
+
+        A guard against crossings takes several times as long as one against folds alone, and holds
+        more than it must where an input crosses itself.
         """
-        monitor = self.monitor
-        work, stop = self._guarded(mesh, featured, ())
-        n_flaws = 0 if monitor.is_cancelled else self._count_flaws(before, work.mesh)
-        if not n_flaws:
-            return work, stop, 0
-        counts = monitor.counts
+        folds = FoldCheck(self.parallel)
         crossings = CrossingCheck(self.parallel, self.recipe.avoid_intersections)
-        checks = FoldCheck(self.parallel), crossings
-        other, other_stop = self._guarded(before.copy(), featured, checks)
-        n_left = self._count_flaws(before, other.mesh)
-        if not monitor.is_cancelled and n_left < n_flaws:
-            return other, other_stop, n_left
-        monitor.counts = counts
-        return work, other_stop if monitor.is_cancelled else stop, n_flaws
+        if self._may_mend(best.work):
+            mend_folds(best.work, before, make_schedule(self.recipe)[-1])
+            best = self._judged(best, before)
+        guards: list[tuple[Check, ...]] = [(folds,), (folds, crossings)]
+        for checks in guards[self.recipe.avoid_intersections :]:
+            if not (best.n_flaws or best.n_crossings) or self.monitor.is_cancelled:
+                break
+            other = self._judged(self._swept(before.copy(), before, featured, checks), before)
+            if not self.monitor.is_cancelled:
+                best = min(best, other, key=lambda swept: (swept.n_flaws, swept.n_crossings))
+        return best
+
+    def _judged(self, swept: Swept, before: Mesh) -> Swept:
+        """Count flaws, and faces that have come to cross others."""
+        after = swept.work.mesh
+        n_flaws = self._count_flaws(before, after)
+        n_crossings = count_new_crossings(before, after, False, self.parallel)
+        return replace(swept, n_flaws=n_flaws, n_crossings=n_crossings)
+
+    def _may_mend(self, work: Work) -> bool:
+        """Tell whether edges may be changed after the last step."""
+        plan = self.plan
+        bound = plan.max_deviation is not None or plan.adaptation is not None
+        return not (bound or work.featured.on_non_manifold is not None or self.monitor.is_cancelled)
 
     def _count_flaws(self, before: Mesh, after: Mesh) -> int:
         """Count the flaws that sweeps have made."""
+        if self.monitor.is_cancelled:
+            return 0
         return count_new_flaws(before, after, self.recipe.avoid_intersections, self.parallel)
 
-    def _guarded(
-        self, mesh: Mesh, featured: FeaturedReference, checks: tuple[Check, ...]
-    ) -> tuple[Work, Stop]:
+    def _swept(
+        self, mesh: Mesh, before: Mesh, featured: FeaturedReference, checks: tuple[Check, ...]
+    ) -> Swept:
         """Sweep over a mesh and finish it, with a guard that makes these checks."""
         self.monitor.counts = []
         work = Work(mesh, featured, self.plan, self.monitor, self.may_run_parallel)
@@ -185,7 +219,7 @@ class Job:
         stop = run_sweeps(work, make_schedule(self.recipe), guard)
         if has_finish(work):
             finish(work, guard)
-        return work, stop
+        return Swept(work, stop, self.monitor.counts, self._count_flaws(before, work.mesh))
 
     def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
         """Set the lengths of a mesh, mark its features, build the reference."""

@@ -13,12 +13,11 @@ from ..core.vocabulary import (
     FloatArray,
     IndexArray,
     Mesh,
-    Tree,
 )
 from ..features.polyline import find_siblings
 from ..reference.build import FeaturedReference
 from ..reference.bvh import closest_faces
-from .guard import Offenders, tree_of
+from .guard import LazyTree, Offenders, lazy_tree, tree_of
 
 __all__ = ["DeviationCheck", "edges_to_refine", "sample_mesh", "shortened_lengths"]
 
@@ -64,11 +63,11 @@ class DeviationCheck:
         F = self.reference.origin.reshape(-1, 3)
         self.samples, _ = sample_mesh(self.reference.X, F)
 
-    def remember(self, mesh: Mesh, tree: Tree) -> None:
+    def remember(self, mesh: Mesh, tree: LazyTree) -> None:
         """Nothing: a mesh is compared with the input."""
 
     def distances(
-        self, mesh: Mesh, tree: Tree, trust: float
+        self, mesh: Mesh, tree: LazyTree, trust: float
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distances of samples: of the mesh from the input, and of the input from the mesh.
 
@@ -87,10 +86,10 @@ class DeviationCheck:
         hint = _hints(mesh, F, mesh.source[alive])[face]
         _, to_input = closest_faces(self.reference.tree, points, hint, trust, self.parallel)
         anywhere = np.full(len(self.samples), NONE, np.int32)
-        _, from_input = closest_faces(tree, self.samples, anywhere, trust, self.parallel)
+        _, from_input = closest_faces(tree(), self.samples, anywhere, trust, self.parallel)
         return points, to_input, from_input
 
-    def offenders(self, mesh: Mesh, tree: Tree) -> Offenders:
+    def offenders(self, mesh: Mesh, tree: LazyTree) -> Offenders:
         """Return the samples of either surface that lie too far from the other."""
         limit = _SAMPLED_SHARE * self.distance
         points, to_input, from_input = self.distances(mesh, tree, limit)
@@ -99,7 +98,7 @@ class DeviationCheck:
 
     def measure(self, mesh: Mesh) -> dict[str, float]:
         """Largest distance of a sample, each way."""
-        tree = tree_of(mesh, self.parallel)
+        tree = lazy_tree(mesh, self.parallel)
         _, to_input, from_input = self.distances(mesh, tree, 0.0)
         return {"to_input": float(to_input.max()), "from_input": float(from_input.max())}
 

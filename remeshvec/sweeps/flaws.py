@@ -7,22 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.vocabulary import DEAD, BoolArray, FloatArray, IndexArray, Mesh, Tree
+from ..core.vocabulary import DEAD, BoolArray, FloatArray, IndexArray, Mesh
 from ..mesh.blocks import make_blocks
 from ..operations.folds import area_vectors, find_flat_faces, find_folds, has_folds
 from ..reference.crossings import crossing_faces
-from .guard import Offenders, tree_of
+from .guard import LazyTree, Offenders, lazy_tree
 
-__all__ = ["CrossingCheck", "FoldCheck", "count_new_flaws"]
-
-# For checks that ask no tree.
-NO_TREE = Tree(
-    np.empty((0, 9)),
-    np.empty(0, np.int32),
-    np.empty(0, np.int32),
-    np.empty((0, 6)),
-    np.zeros(1, np.int64),
-)
+__all__ = ["CrossingCheck", "FoldCheck", "count_new_crossings", "count_new_flaws"]
 
 # New flaws within so many target lengths of old ones are the old ones, moved; ...
 _NEAR = 1.0
@@ -67,7 +58,7 @@ class FoldCheck:
     def __init__(self, parallel: bool) -> None:
         self.parallel = parallel
 
-    def remember(self, mesh: Mesh, tree: Tree) -> None:
+    def remember(self, mesh: Mesh, tree: LazyTree) -> None:
         """Note where the mesh is folded, and where faces have no area."""
         vectors = area_vectors(mesh, make_blocks(mesh), self.parallel)
         h = find_folds(mesh, vectors)
@@ -82,7 +73,7 @@ class FoldCheck:
         flat = find_flat_faces(mesh, vectors)
         self.flat = _Places(self._middles(mesh, flat), float(len(flat)))
 
-    def offenders(self, mesh: Mesh, tree: Tree) -> Offenders:
+    def offenders(self, mesh: Mesh, tree: LazyTree) -> Offenders:
         """Corners of the faces at new folded edges, and of new faces without area."""
         vectors = area_vectors(mesh, make_blocks(mesh), self.parallel)
         h = find_folds(mesh, vectors)
@@ -114,21 +105,21 @@ class CrossingCheck:
         """Let all crossings count as new."""
         self.crossings = _Places(np.empty((0, 3)), 0.0)
 
-    def remember(self, mesh: Mesh, tree: Tree) -> None:
+    def remember(self, mesh: Mesh, tree: LazyTree) -> None:
         """Note where faces cross."""
         _, points, area = self._crossings(mesh, tree)
         self.crossings = _Places(points, float(area.sum()))
 
-    def offenders(self, mesh: Mesh, tree: Tree) -> Offenders:
+    def offenders(self, mesh: Mesh, tree: LazyTree) -> Offenders:
         """Corners of faces that cross others anew."""
         faces, points, area = self._crossings(mesh, tree)
         reach = _NEAR * mesh.X[mesh.origin[3 * faces], 3]
         return _corners(mesh, faces[self.crossings.new(points, area, reach)])
 
-    def _crossings(self, mesh: Mesh, tree: Tree) -> tuple[IndexArray, FloatArray, FloatArray]:
+    def _crossings(self, mesh: Mesh, tree: LazyTree) -> tuple[IndexArray, FloatArray, FloatArray]:
         """Return the faces that cross others, their middles and areas."""
-        found = crossing_faces(tree, self.parallel, self.adjacent)
-        corners = tree.corners[found].reshape(-1, 3, 3)
+        found = crossing_faces(tree(), self.parallel, self.adjacent)
+        corners = tree().corners[found].reshape(-1, 3, 3)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         alive = np.flatnonzero(mesh.origin[::3] != DEAD).astype(np.int32)
         return alive[found], corners.mean(axis=1), 0.5 * np.linalg.norm(normals, axis=1)
@@ -142,13 +133,17 @@ def count_new_flaws(before: Mesh, after: Mesh, crossings: bool, parallel: bool) 
     count = 0
     if has_folds(after, make_blocks(after), parallel):
         check = FoldCheck(parallel)
-        check.remember(before, NO_TREE)
-        count += check.offenders(after, NO_TREE).size
-    if crossings:
-        among = CrossingCheck(parallel, True)
-        among.remember_nothing()
-        tree = tree_of(after, parallel)
-        if among.offenders(after, tree).size:
-            among.remember(before, tree_of(before, parallel))
-            count += among.offenders(after, tree).size
-    return count
+        check.remember(before, lazy_tree(before, parallel))
+        count += check.offenders(after, lazy_tree(after, parallel)).size
+    return count + (count_new_crossings(before, after, True, parallel) if crossings else 0)
+
+
+def count_new_crossings(before: Mesh, after: Mesh, adjacent: bool, parallel: bool) -> int:
+    """Count the vertices of faces that cross others, and did not in an earlier mesh."""
+    check = CrossingCheck(parallel, adjacent)
+    check.remember_nothing()
+    tree = lazy_tree(after, parallel)
+    if not check.offenders(after, tree).size:
+        return 0
+    check.remember(before, lazy_tree(before, parallel))
+    return check.offenders(after, tree).size

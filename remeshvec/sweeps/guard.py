@@ -11,27 +11,20 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..core.vocabulary import (
-    CURVE,
-    DEAD,
-    HALTED,
-    HELD,
-    INNER,
-    NONE,
-    PINNED,
-    BoolArray,
-    FloatArray,
-    IndexArray,
-    Mesh,
-    Tree,
-)
+from ..core.lazy import Lazy
+from ..core.vocabulary import DEAD, NONE, BoolArray, FloatArray, IndexArray, Mesh, Tree
 from ..reference.bvh import build_tree, closest_faces
+from .holding import hold, let_go, rings_around
 from .work import Work
 
-__all__ = ["Check", "Guard", "HoldingGuard", "Offenders", "tree_of"]
+__all__ = ["Check", "Guard", "HoldingGuard", "LazyTree", "Offenders", "lazy_tree", "tree_of"]
 
 # Rings of faces that are held around what is wrong, in every attempt; then a sweep is left out.
 _RINGS = (0, 1, 1, 2, 2, 3, 4, 6, 8, 12)
+
+
+# Not all checks need a tree, which takes about as long as a phase.
+LazyTree = Lazy[Tree]
 
 
 class Offenders(NamedTuple):
@@ -51,11 +44,11 @@ class Offenders(NamedTuple):
 class Check(Protocol):
     """Says where a mesh is worse than an earlier one, or than it may be."""
 
-    def remember(self, mesh: Mesh, tree: Tree) -> None:
-        """Take in a compact mesh, and the tree over its faces, before it is changed."""
+    def remember(self, mesh: Mesh, tree: LazyTree) -> None:
+        """Take in a compact mesh before it is changed; ``tree()`` is the tree over its faces."""
 
-    def offenders(self, mesh: Mesh, tree: Tree) -> Offenders:
-        """Return where the changed mesh is not good; the tree is over its faces."""
+    def offenders(self, mesh: Mesh, tree: LazyTree) -> Offenders:
+        """Return where the changed mesh is not good; ``tree()`` is over its faces."""
 
 
 class Guard:
@@ -85,7 +78,7 @@ class HoldingGuard(Guard):
         if not is_compact:
             work.compact()
         with monitor.watch.time("guard"):
-            tree = tree_of(work.mesh, self.parallel)
+            tree = lazy_tree(work.mesh, self.parallel)
             for check in self.checks:
                 check.remember(work.mesh, tree)
         held = np.zeros(len(work.mesh.X), np.bool_)
@@ -97,14 +90,14 @@ class HoldingGuard(Guard):
             with monitor.watch.time("guard"):
                 offenders = self._offenders(trial.mesh)
                 if not offenders.size:
-                    _release(trial.mesh, held)
+                    let_go(trial.mesh, held)
                     work.adopt(trial)
                     return
                 if monitor.is_cancelled:
                     break
                 work.was_guarded = True
                 held |= self._hold(work.mesh, tree, offenders, attempt)
-        _release(work.mesh, held)
+        let_go(work.mesh, held)
         work.step = np.inf
         monitor.counts[-1] = counts | {
             name: 0 for name in ("collapse", "flip") if name not in counts
@@ -112,40 +105,30 @@ class HoldingGuard(Guard):
 
     def _offenders(self, mesh: Mesh) -> Offenders:
         """Return what the first check finds that finds something; cheap ones come first."""
-        tree = tree_of(mesh, self.parallel)
+        tree = lazy_tree(mesh, self.parallel)
         for check in self.checks:
             found = check.offenders(mesh, tree)
             if found.size:
                 break
         return found
 
-    def _hold(self, mesh: Mesh, tree: Tree, offenders: Offenders, attempt: int) -> BoolArray:
+    def _hold(self, mesh: Mesh, tree: LazyTree, offenders: Offenders, attempt: int) -> BoolArray:
         """Hold a compact mesh around offenders, and rings of faces more; returns what is new.
 
         Trials keep the numbers of vertices, so these say where an offender came from even on a thin
         part, the other side of which may be closer.
         """
-        anywhere = np.full(len(offenders.points), NONE, np.int32)
-        faces, _ = closest_faces(tree, offenders.points, anywhere, 0.0, self.parallel)
-        F = mesh.origin.reshape(-1, 3)
-        is_held = np.zeros(len(mesh.X), np.bool_)
-        is_held[F[faces]] = True
-        is_held[offenders.vertices] = True
-        for _ in range(_RINGS[attempt]):
-            is_held[F[is_held[F].any(axis=1)]] = True
-        _agree_across_sheets(mesh, is_held)
-        inner, on_curve = is_held & (mesh.kind == INNER), is_held & (mesh.kind == CURVE)
-        mesh.kind[inner], mesh.kind[on_curve] = HELD, PINNED
-        ends = is_held[mesh.origin] & is_held[F[:, [1, 2, 0]].ravel()]
-        mesh.curve[ends & (mesh.curve == NONE)] = HALTED
-        return np.asarray(inner | on_curve)
+        at = [offenders.vertices]
+        if len(offenders.points):
+            anywhere = np.full(len(offenders.points), NONE, np.int32)
+            faces, _ = closest_faces(tree(), offenders.points, anywhere, 0.0, self.parallel)
+            at.append(mesh.origin.reshape(-1, 3)[faces].ravel())
+        return hold(mesh, rings_around(mesh, np.concatenate(at), _RINGS[attempt]))
 
 
-def _release(mesh: Mesh, held: BoolArray) -> None:
-    """Let go of what was held for a sweep; the mesh may have lost some of it."""
-    mesh.kind[held & (mesh.kind == HELD)] = INNER
-    mesh.kind[held & (mesh.kind == PINNED)] = CURVE
-    mesh.curve[mesh.curve == HALTED] = NONE
+def lazy_tree(mesh: Mesh, parallel: bool) -> LazyTree:
+    """Return the tree over the faces of a mesh, to be built where a check asks for it."""
+    return Lazy(lambda: tree_of(mesh, parallel))
 
 
 def tree_of(mesh: Mesh, parallel: bool) -> Tree:
@@ -156,14 +139,3 @@ def tree_of(mesh: Mesh, parallel: bool) -> Tree:
     twin = mesh.twin.reshape(-1, 3)[alive].ravel()
     twin = np.where(twin == NONE, NONE, 3 * new[twin // 3] + twin % 3).astype(np.int32)
     return build_tree(mesh.X, F, twin, np.zeros(len(F), np.int32), parallel)
-
-
-def _agree_across_sheets(mesh: Mesh, is_held: BoolArray) -> None:
-    """Hold all vertices that lie where a held one lies on a boundary: sheets may share it."""
-    h = np.flatnonzero(mesh.twin == NONE)
-    border = np.unique(mesh.origin[h])
-    if len(border):
-        _, place = np.unique(mesh.X[border, :3], axis=0, return_inverse=True)
-        held = np.zeros(len(border), np.bool_)
-        held[place.reshape(-1)[is_held[border]]] = True
-        is_held[border] = held[place.reshape(-1)]
