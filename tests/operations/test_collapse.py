@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers import naive, zoo
+from helpers.collapses import LOOSE
 from helpers.structure import (
     assert_same_bits,
     assert_valid,
@@ -17,7 +18,7 @@ from helpers.structure import (
 
 from data.shapes import topology
 from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, HELD, INNER
-from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
+from remeshvec.operations.collapse import collapse_short_edges
 from remeshvec.operations.guards import keeps_curves
 from remeshvec.operations.outcomes import (
     COLLAPSED,
@@ -32,10 +33,7 @@ from remeshvec.operations.rings import RING_CAPACITY
 
 
 def limits(shortest, **changes):
-    loose = CollapseLimits(
-        shortest=shortest, longest=1e9, foldover_cosine=0.0, quadric_reach=0.0, sliver_check=False
-    )
-    return loose._replace(**changes)
+    return LOOSE._replace(shortest=shortest, **changes)
 
 
 def outcomes(mesh, shortest, **changes):

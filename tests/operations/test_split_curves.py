@@ -5,13 +5,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from helpers import naive, zoo
+from helpers.siblings import opened, sheets_at_places, sibling_ends, siblings_of
 from helpers.structure import (
     assert_on_reference,
     assert_valid,
     blocks_of,
     built,
     curve_edges,
-    cut_open,
     draw,
     faces_of,
     featured,
@@ -25,7 +25,6 @@ from helpers.structure import (
 from data.shapes import nonmanifold
 from remeshvec.core.vocabulary import (
     CURVE,
-    DEAD,
     FIXED,
     FROZEN,
     HALTED,
@@ -35,7 +34,6 @@ from remeshvec.core.vocabulary import (
     NONE,
     PINNED,
 )
-from remeshvec.features.polyline import find_siblings
 from remeshvec.operations.split import MAX_ROUNDS, compact, split_edges, split_long_edges
 
 ROWS = 5  # vertices of a column of `zoo.grid()`, which has 7 of them
@@ -221,11 +219,6 @@ def test_told_to_any_edge_is_split():
 # --- siblings ------------------------------------------------------------------------------------
 
 
-def seams(mesh):
-    h = np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).astype(np.int32)
-    return find_siblings(mesh.X, mesh.origin, h)
-
-
 def two_sheets(reach=0.1):
     """Two faces on one edge of length 2; the first is a needle with longer sides, the second is not."""
     P = np.array([[0, 0, 0], [2, 0, 0], [2.0 + reach, 0.02, 0], [0, 0, 0], [2, 0, 0], [1, 0, 2]])
@@ -245,7 +238,7 @@ def test_siblings_are_split_together():
     assert_valid(refined, slits=True)
     middle = np.flatnonzero((refined.X[:, :3] == [1, 0, 0]).all(axis=1))
     assert len(middle) == 2 and (refined.kind[middle] == CURVE).all()
-    assert (refined.curve >= NON_MANIFOLD).sum() == 4 and len(seams(refined)[0]) == 4
+    assert (refined.curve >= NON_MANIFOLD).sum() == 4 and len(siblings_of(refined)[0]) == 4
 
 
 def test_siblings_that_nobody_wants_split_stay():
@@ -260,10 +253,9 @@ def test_siblings_that_nobody_wants_split_stay():
 def test_seams_stay_closed(name, factor):
     """All sheets have the same points on a seam, bit by bit, and are on the same curves."""
     known = nonmanifold.COMPLEXES[name]
-    mesh, source = cut_open(*known.make())
-    built_ = featured(mesh, factor * known.size, vertex_source=source, feature_angle=40.0)
+    mesh, reference = opened(*known.make(), factor * known.size, feature_angle=40.0)
     sheets = sheets_at_places(mesh)
-    mesh = rounds(mesh, 1.2, seams)
+    mesh = rounds(mesh, 1.2, siblings_of)
     found = sheets_at_places(mesh)
     assert len(found) > len(sheets) or factor > 0.2
     lengths = dict.fromkeys(sheets.values(), 0.0)
@@ -272,7 +264,7 @@ def test_seams_stay_closed(name, factor):
     for count in lengths:
         old = sum(np.linalg.norm(np.subtract(*edge)) for edge, k in sheets.items() if k == count)
         assert lengths[count] == pytest.approx(old, rel=1e-9)
-    members, group = seams(mesh)
+    members, group = siblings_of(mesh)
     for i, j in pairwise(group):
         assert len(set((mesh.curve[members[i:j]]).tolist())) == 1
         for end in range(2):
@@ -281,22 +273,7 @@ def test_seams_stay_closed(name, factor):
                 len({(int(mesh.kind[v]), int(mesh.birth[v]), mesh.X[v, 3]) for v in at}) == 1
                 or (mesh.kind[at] == FIXED).all()
             )
-    assert_on_reference(mesh, built_.reference)
-
-
-def sibling_ends(mesh, h):
-    """Ends in the order of their places."""
-    return sorted((mesh.origin[h], mesh.origin[next_of(h)]), key=lambda v: mesh.X[v, :3].tolist())
-
-
-def sheets_at_places(mesh):
-    """Number of half-edges of every edge on a seam, by its place."""
-    found = {}
-    for h in np.flatnonzero(mesh.curve >= NON_MANIFOLD).tolist():
-        edge = tuple(tuple(mesh.X[v, :3].tolist()) for v in sibling_ends(mesh, h))
-        found[edge] = found.get(edge, 0) + 1
-    assert min(found.values()) > 1, "a seam came open"
-    return found
+    assert_on_reference(mesh, reference)
 
 
 # --- births --------------------------------------------------------------------------------------

@@ -1,0 +1,7 @@
+"""Collapse limits that only the guards of topology and curves restrict, for tests to tighten."""
+
+from remeshvec.operations.collapse import CollapseLimits
+
+LOOSE = CollapseLimits(
+    shortest=2e-3, longest=1e9, foldover_cosine=0.0, quadric_reach=0.0, sliver_check=False
+)
