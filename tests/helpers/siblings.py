@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from helpers.structure import cut_open, featured, next_of
+from helpers.structure import cut_open, ends, featured
 from remeshvec.core.vocabulary import DEAD, NON_MANIFOLD, Mesh
 from remeshvec.features.polyline import find_siblings
 from remeshvec.reference.surface import Reference
@@ -38,4 +38,4 @@ def sheets_at_places(mesh: Mesh) -> dict[tuple, int]:
 
 def sibling_ends(mesh: Mesh, h: int) -> list[int]:
     """Ends of a half-edge in the order of their places, which is the same for all its siblings."""
-    return sorted((mesh.origin[h], mesh.origin[next_of(h)]), key=lambda v: mesh.X[v, :3].tolist())
+    return sorted(ends(mesh, h), key=lambda v: mesh.X[v, :3].tolist())

@@ -13,8 +13,8 @@ from helpers.structure import (
     assert_valid,
     built,
     copied,
+    ends,
     faces_of,
-    next_of,
     one_block,
 )
 
@@ -63,7 +63,7 @@ def test_one_sheet_that_refuses_keeps_all():
     assert_valid(free, slits=True)
     for h in pages.tolist():
         spoilt = copied(mesh)
-        a, b = int(spoilt.origin[h]), int(spoilt.origin[next_of(h)])
+        a, b = ends(spoilt, h)
         F = faces_of(spoilt)
         beside = next(set(f) - {a} for f in F.tolist() if a in f and b not in f)
         v = next(v for v in beside if spoilt.kind[v] == INNER)
@@ -77,7 +77,7 @@ def test_one_sheet_that_refuses_keeps_all():
 
 
 def middle(mesh, h):
-    return mesh.X[[mesh.origin[h], mesh.origin[next_of(int(h))]], :3].mean(axis=0)
+    return mesh.X[list(ends(mesh, h)), :3].mean(axis=0)
 
 
 def test_long_siblings_stay():
@@ -91,8 +91,8 @@ def slit_tube(n, m=6):
     """Tube of n around, cut along a line: both sides of the cut are siblings on the same sheet."""
     V, _ = zoo.cylinder(n, m)
     mesh = built(np.vstack([V, V[:m]]), zoo.wrapped_grid(n + 1, m, False, False))
-    ends = mesh.origin, mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()
-    cut = (mesh.twin == NONE) & (ends[0] % (n * m) < m) & (ends[1] % (n * m) < m)
+    a, b = mesh.origin, mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    cut = (mesh.twin == NONE) & (a % (n * m) < m) & (b % (n * m) < m)
     members, group = find_siblings(mesh.X, mesh.origin, np.flatnonzero(cut).astype(np.int32))
     assert np.array_equal(group, np.arange(0, 2 * m, 2))
     mesh.curve[members] += NON_MANIFOLD
@@ -118,15 +118,14 @@ def test_siblings_whose_rings_overlap_stay(n):
 
 def is_inner(mesh, h):
     """Whether an edge of the cut does not touch the rims."""
-    z = mesh.X[[mesh.origin[h], mesh.origin[next_of(int(h))]], 2]
+    z = mesh.X[list(ends(mesh, h)), 2]
     return z.min() > 0 and z.max() < 2
 
 
 def ring(mesh, h):
     """Vertices of all faces at both ends of an edge."""
     F = faces_of(mesh)
-    ends = [mesh.origin[h], mesh.origin[next_of(int(h))]]
-    return set(F[np.isin(F, ends).any(axis=1)].ravel().tolist())
+    return set(F[np.isin(F, ends(mesh, h)).any(axis=1)].ravel().tolist())
 
 
 def test_groups_with_a_removed_member_stay():

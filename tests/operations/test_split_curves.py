@@ -13,12 +13,13 @@ from helpers.structure import (
     built,
     curve_edges,
     draw,
+    ends,
     faces_of,
     featured,
     half_edge,
-    next_of,
     one_block,
     packed,
+    place,
     shape_of,
 )
 
@@ -158,7 +159,7 @@ def test_frozen_edges_are_never_split(factor, flag):
     for h in frozen:
         mesh.curve[h] = flag
         mesh.curve[mesh.twin[h]] = flag
-        mesh.kind[[mesh.origin[h], mesh.origin[next_of(h)]]] = FIXED
+        mesh.kind[list(ends(mesh, h))] = FIXED
     places = {place(mesh, h) for h in frozen}
     refined, count = split(mesh, factor)
     assert count
@@ -166,15 +167,9 @@ def test_frozen_edges_are_never_split(factor, flag):
     still = np.flatnonzero(refined.curve == flag)
     assert len(still) == 2 * len(frozen) and {place(refined, h) for h in still} == places
     # All others are as they would be: faces are high enough to have all their long edges split.
-    frozen = {frozenset((int(mesh.origin[h]), int(mesh.origin[next_of(h)]))) for h in frozen}
+    frozen = {frozenset(ends(mesh, h)) for h in frozen}
     V, F = mesh.X[:, :3], faces_of(mesh)
     assert count == len(naive.asked_splits(V, F, factor) - frozen) < len(naive.edges(F))
-
-
-def place(mesh, h):
-    return frozenset(
-        tuple(mesh.X[v, :3].tolist()) for v in (mesh.origin[h], mesh.origin[next_of(h)])
-    )
 
 
 def test_a_low_face_beside_a_frozen_edge_splits_its_longest_other_one():
@@ -206,9 +201,7 @@ def test_rounds_end_beside_frozen_edges():
 def test_told_to_any_edge_is_split():
     mesh = crossed()
     edges = np.array([half_edge(mesh, 9, 10), half_edge(mesh, 27, 35)], np.int32)
-    middles = {
-        tuple(sum(mesh.X[[mesh.origin[h], mesh.origin[next_of(int(h))]], :3]) / 2) for h in edges
-    }
+    middles = {tuple(sum(mesh.X[list(ends(mesh, h)), :3]) / 2) for h in edges}
     refined = split_edges(mesh, one_block(mesh), edges, False)
     assert_valid(refined)
     new = set(map(tuple, refined.X[:, :3].tolist())) - set(map(tuple, mesh.X[:, :3].tolist()))
