@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.processes import surroundings
 
 import remeshvec
 from remeshvec.cli.command import ProgressLine, main
@@ -34,19 +35,6 @@ def sheet(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_mesh("in.obj", *bumpy_sheet())
     return "in.obj"
-
-
-@pytest.fixture
-def asked(monkeypatch):
-    """Let the command call the real remesher, and note with what."""
-    calls, real = [], remeshvec.remesh
-
-    def remesh(V, F, L=None, **options):
-        calls.append({"L": L} | options)
-        return real(V, F, L, **options)
-
-    monkeypatch.setattr("remeshvec.remesh", remesh)
-    return calls
 
 
 def failing_remesh(error):
@@ -303,11 +291,6 @@ def test_progress_of_real_work(sheet, capsys, monkeypatch):
 
 def command(*arguments):
     return [sys.executable, "-m", "remeshvec", *arguments]
-
-
-def surroundings():
-    root = str(Path(__file__).parents[2])
-    return os.environ | {"PYTHONPATH": root}
 
 
 def test_as_a_process_bad_input_gives_one_line_and_status_2(sheet):

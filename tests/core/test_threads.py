@@ -6,21 +6,19 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numba
 import numpy as np
 import pytest
 from helpers import no_negative_index, zoo
+from helpers.processes import PATIENCE, eventually
 
 from remeshvec import remesh
 from remeshvec.core import threads as _threads
 from remeshvec.core.compiler import kernel as Kernel
 from remeshvec.core.compiler.decorators import ThreadedKernel
 
-ROOT = Path(__file__).resolve().parents[2]
 CORES = 4  # as the tests have it, whatever the machine says
-PATIENCE = 60.0  # seconds after which a call hangs
 
 needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="kernels are not compiled")
 
@@ -67,14 +65,6 @@ def at_once(*functions):
         return [future.result(PATIENCE) for future in futures]
     finally:
         executor.shutdown(wait=False)
-
-
-def eventually(condition):
-    """Wait for what another thread is about to do."""
-    deadline = time.monotonic() + PATIENCE
-    while not condition() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    return condition()
 
 
 # -- the GIL --------------------------------------------------------------------------------------

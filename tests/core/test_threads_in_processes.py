@@ -1,15 +1,13 @@
 """Threads in processes: children of every kind, interrupts, ends, kernels compiled at once."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from core.test_threads import CORES, PATIENCE, at_once, needs_jit
-
-ROOT = Path(__file__).resolve().parents[2]
+from core.test_threads import CORES, at_once, needs_jit
+from helpers.processes import PATIENCE, ROOT, surroundings
 
 COMMON = """
 import hashlib, json, multiprocessing, os, sys, threading, time
@@ -37,7 +35,7 @@ def call(_):
 def in_a_process(tmp_path, text, *paths, limit=CORES, **env):
     """Run a script in the root; what it prints last, as JSON."""
     (tmp_path / "script.py").write_text(COMMON + text)
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *map(str, paths)]), **env}
+    env = {**surroundings(*paths), **env}
     env.pop("NUMBA_NUM_THREADS", None)
     if limit:
         env["NUMBA_NUM_THREADS"] = str(limit)
