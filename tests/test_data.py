@@ -2,13 +2,12 @@
 
 import hashlib
 import re
-import subprocess
-import sys
 
 import igl
 import numpy as np
 import pytest
 from helpers import zoo
+from helpers.processes import run_python
 
 from data.shapes.bracket import bracket
 from data.shapes.sculpted import linked_rings, thin_sheet, wavy_sheet
@@ -89,8 +88,4 @@ def test_made_again(make):
 
 @pytest.mark.slow
 def test_the_script_makes_the_same_bytes():
-    script = zoo.DATA / "make_meshes.py"
-    done = subprocess.run(
-        [sys.executable, str(script), "--check"], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    run_python(zoo.DATA / "make_meshes.py", "--check")

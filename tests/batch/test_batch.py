@@ -6,12 +6,12 @@ import gc
 import hashlib
 import io
 import sys
-import threading
 
 import numpy as np
 import pytest
 from helpers import zoo
-from helpers.processes import PATIENCE, SLEEPS
+from helpers.processes import SLEEPS
+from helpers.threads import at_once
 
 from remeshvec import (
     MeshInputError,
@@ -110,17 +110,11 @@ def test_as_completed():
 
 def test_calls_at_once():
     """From several threads, each with workers of its own."""
-    found = {}
 
-    def call(name):
-        found[name] = [digest(i.result) for i in remesh_many(meshes(), workers=2)]
+    def call():
+        return [digest(item.result) for item in remesh_many(meshes(), workers=2)]
 
-    threads = [threading.Thread(target=call, args=(k,)) for k in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(PATIENCE)
-    assert found[0] == found[1] == [digest(remesh(*mesh)) for mesh in meshes()]
+    assert at_once(call, call) == 2 * [[digest(remesh(*mesh)) for mesh in meshes()]]
 
 
 def test_what_workers_print_does_not_disturb():

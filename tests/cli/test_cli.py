@@ -11,15 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import zoo
 from helpers.processes import surroundings
 
 import remeshvec
 from remeshvec.cli.command import ProgressLine, main
 from remeshvec.errors import OptionError
 from remeshvec.files.mesh_files import SUFFIXES, read_mesh, write_mesh
-
-SAMPLES = Path(__file__).parents[3] / "shared" / "data" / "samples"
-needs_samples = pytest.mark.skipif(not SAMPLES.is_dir(), reason="the samples are not here")
 
 
 def bumpy_sheet(n=12):
@@ -319,13 +317,12 @@ def test_as_a_process_a_closed_pipe_gives_no_traceback(sheet):
     assert len(read_mesh("out.obj").F) > 0
 
 
-@needs_samples
 @pytest.mark.parametrize(
     ("name", "dirt"),
     [("sample1.json", "unreferenced vertices: 4,875"), ("cow.obj", None), ("wolf_head.obj", None)],
 )
 def test_real_samples(name, dirt, tmp_path, capsys):
-    assert main([str(SAMPLES / name), "-o", str(tmp_path / "out.ply")]) == 0
+    assert main([str(zoo.sample_path(name)), "-o", str(tmp_path / "out.ply")]) == 0
     out = capsys.readouterr().out
     assert dirt is None or f"note: {dirt}" in out
     assert len(read_mesh(tmp_path / "out.ply").F) > 100

@@ -5,13 +5,13 @@ import itertools
 import sys
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 
 import numba
 import numpy as np
 import pytest
 from helpers import no_negative_index, zoo
 from helpers.processes import PATIENCE, eventually
+from helpers.threads import at_once
 
 from remeshvec import remesh
 from remeshvec.core import threads as _threads
@@ -49,22 +49,6 @@ def helper_threads():
 def digest(result):
     arrays = (result.V, result.F, result.birth_face, result.birth_barycentric)
     return hashlib.sha256(b"".join(np.ascontiguousarray(x).tobytes() for x in arrays)).hexdigest()
-
-
-def at_once(*functions):
-    """Run functions in threads that start together; their results, or the first error."""
-    barrier = threading.Barrier(len(functions))
-
-    def run(function):
-        barrier.wait(PATIENCE)
-        return function()
-
-    executor = ThreadPoolExecutor(len(functions))
-    futures = [executor.submit(run, function) for function in functions]
-    try:
-        return [future.result(PATIENCE) for future in futures]
-    finally:
-        executor.shutdown(wait=False)
 
 
 # -- the GIL --------------------------------------------------------------------------------------

@@ -1,13 +1,12 @@
 """Threads in processes: children of every kind, interrupts, ends, kernels compiled at once."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from core.test_threads import CORES, at_once, needs_jit
-from helpers.processes import PATIENCE, ROOT, surroundings
+from core.test_threads import CORES, needs_jit
+from helpers.processes import PATIENCE, run_python, surroundings
+from helpers.threads import at_once
 
 COMMON = """
 import hashlib, json, multiprocessing, os, sys, threading, time
@@ -39,16 +38,7 @@ def in_a_process(tmp_path, text, *paths, limit=CORES, **env):
     env.pop("NUMBA_NUM_THREADS", None)
     if limit:
         env["NUMBA_NUM_THREADS"] = str(limit)
-    done = subprocess.run(
-        [sys.executable, str(tmp_path / "script.py")],
-        env=env,
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    done = run_python(tmp_path / "script.py", env=env, timeout=PATIENCE)
     assert "Traceback" not in done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 

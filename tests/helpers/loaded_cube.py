@@ -38,13 +38,17 @@ def assert_field(data, name="height"):
     assert np.allclose(data.on_vertices[name].ravel(), data.V[:, 2], atol=1e-6)
 
 
-def assert_charts(data):
-    """Check that the texture still covers its area and that no face spans several charts."""
-    uv = data.on_corners["uv"] if "uv" in data.on_corners else data.find(next(
-        name for name in data.on_vertices if "uv" in name or "TCoords" in name
-    ))  # fmt: skip
+def assert_charts(uv):
+    """Check that texture coordinates (m, 3, 2) cover their area and that no face spans two charts."""
     assert np.isclose(abs(areas(uv)).sum(), 0.81, rtol=1e-5)
     assert np.ptp(uv, axis=1).max() < 0.2
+
+
+def corner_uv(data):
+    """Texture coordinates at corners, wherever a format holds them."""
+    if "uv" in data.on_corners:
+        return data.on_corners["uv"]
+    return data.find(next(name for name in data.on_vertices if "uv" in name or "TCoords" in name))
 
 
 def assert_groups(data, name="group"):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -29,6 +31,23 @@ class Fatal:
 
 EXIT, KILLED = Fatal(os._exit, 7), Fatal(signal.raise_signal, getattr(signal, "SIGKILL", 15))
 SLEEPS = Fatal(time.sleep, 10 * PATIENCE)
+
+
+def run_python(
+    *arguments: object, env: dict[str, str] | None = None, timeout: float | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run Python in the root of this checkout and check that it succeeds; ``env`` as it is."""
+    done = subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        env=surroundings() if env is None else env,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    return done
 
 
 def eventually(condition: Callable[[], bool]) -> bool:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from helpers import naive, zoo
-from helpers.collapses import LOOSE
+from helpers.collapses import LOOSE, survivor_of
 from helpers.structure import (
     assert_same_bits,
     assert_valid,
@@ -76,7 +76,7 @@ def test_each_single_collapse_is_that_of_the_twin(name):
             refused += 1
             continue
         taken += 1
-        survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+        survivor = survivor_of(mesh, a, b)
         removed = a + b - survivor
         expected = naive.collapse(F, survivor, removed)
         assert topology_of(faces_of(mesh)) == topology_of(expected)

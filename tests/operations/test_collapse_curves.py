@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from helpers import naive, zoo
-from helpers.collapses import LOOSE
+from helpers.collapses import LOOSE, survivor_of
 from helpers.structure import (
     assert_on_reference,
     assert_same_bits,
@@ -116,7 +116,8 @@ def test_every_edge_in_turn():
         if not tally[COLLAPSED]:
             assert_same_bits(mesh, before)
             continue
-        survivor, removed = (a, b) if mesh.vertex_halfedge[b] == DEAD else (b, a)
+        survivor = survivor_of(mesh, a, b)
+        removed = a + b - survivor
         assert before.kind[survivor] >= before.kind[removed]
         assert mesh.kind[survivor] == before.kind[survivor]
         if before.kind[survivor] > before.kind[removed]:
@@ -148,7 +149,7 @@ def test_a_curve_vertex_never_leaves_its_curve():
     pulled(mesh, a, b)
     middle = (mesh.X[a, :3] + mesh.X[b, :3]) / 2
     assert collapse(mesh)[COLLAPSED] == 1
-    survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+    survivor = survivor_of(mesh, a, b)
     assert np.array_equal(mesh.X[survivor, :3], middle) and mesh.kind[survivor] == CURVE
 
 
@@ -160,7 +161,7 @@ def test_quadric_points_are_for_inner_vertices():
     pulled(mesh, a, b)
     middle = (mesh.X[a, :3] + mesh.X[b, :3]) / 2
     assert collapse(mesh, LOOSE._replace(quadric_reach=3.0))[COLLAPSED] == 1
-    survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+    survivor = survivor_of(mesh, a, b)
     assert np.array_equal(mesh.X[survivor, :3], middle)
 
 
@@ -212,7 +213,7 @@ def test_the_flag_of_either_vanished_edge_is_on_both_sides_of_the_new(which, fla
         mesh.kind[[end, apex]] = FIXED
     pulled(mesh, a, b)
     assert collapse(mesh)[COLLAPSED] == 1
-    survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+    survivor = survivor_of(mesh, a, b)
     joined = half_edge(mesh, survivor, apex)
     assert mesh.curve[joined] == mesh.curve[mesh.twin[joined]] == flag
     assert np.isin(mesh.curve[(mesh.origin != DEAD) & (mesh.twin != NONE)], [NONE, flag]).all()
@@ -226,7 +227,7 @@ def test_births_of_merged_vertices_are_the_smaller_edge():
         mesh.birth[[a, b]] = births
         pulled(mesh, a, b)
         assert collapse(mesh)[COLLAPSED] == 1
-        survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+        survivor = survivor_of(mesh, a, b)
         assert mesh.birth[survivor] == 11
     mesh = crossed()
     corner, other = at(4, 3), at(5, 3)
@@ -243,7 +244,7 @@ def test_lengths_are_those_of_the_place():
         mesh.X[[a, b], 3] = [1.0, 2.0]
         pulled(mesh, a, b)
         assert collapse(mesh)[COLLAPSED] == 1
-        assert mesh.X[a if mesh.vertex_halfedge[a] != DEAD else b, 3] == expected
+        assert mesh.X[survivor_of(mesh, a, b), 3] == expected
 
 
 def test_what_is_short_depends_on_the_lengths_at_the_ends():

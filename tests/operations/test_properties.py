@@ -318,8 +318,8 @@ def sheets(F):
     return {len(users) for users in zoo.edge_faces(F).values()} - {1, 2}
 
 
-def assert_proper(result, F):
-    """Whole faces, each once; edges of three faces and more where the input has such, and no others."""
+def assert_proper(result, F, is_tidy=False):
+    """Whole faces, each once; non-manifold edges as in the input; the topology of a tidy mesh."""
     shape = shape_of(result.F)
     assert np.isfinite(result.V).all()
     assert shape["proper"] and shape["duplicate faces"] == 0
@@ -328,18 +328,23 @@ def assert_proper(result, F):
     assert sheets(result.F) == sheets(once)
     if not sheets(once) and "inconsistent_edges" not in result.report.dirt:
         assert shape["oriented"] and shape["manifold"]
+    if is_tidy:
+        assert shape == shape_of(F)
+
+
+def made(mesh):
+    """A perturbed mesh, and the length asked for."""
+    V, F = zoo.ZOO[mesh["name"]].make()
+    length = mesh["factor"] * zoo.mean_edge(V, F)
+    return *zoo.perturb(V, F, mesh["amount"], mesh["seed"]), length
 
 
 @given(MESHES, CALLS)
 @example({"name": "bipyramid", "amount": 0.0, "seed": 0, "factor": 4.0}, {})
 def test_every_call_returns_a_proper_mesh(mesh, call):
-    V, F = zoo.ZOO[mesh["name"]].make()
-    length = mesh["factor"] * zoo.mean_edge(V, F)
-    V, F = zoo.perturb(V, F, mesh["amount"], mesh["seed"])
+    V, F, length = made(mesh)
     result = remesh(V, F, length, **call)
-    assert_proper(result, F)
-    if zoo.ZOO[mesh["name"]].is_tidy:
-        assert shape_of(result.F) == shape_of(F)
+    assert_proper(result, F, zoo.ZOO[mesh["name"]].is_tidy)
     again = remesh(V, F, length, **call)
     assert again.V.tobytes() == result.V.tobytes() and np.array_equal(again.F, result.F)
 
@@ -347,9 +352,7 @@ def test_every_call_returns_a_proper_mesh(mesh, call):
 @given(MESHES, CONTROLS)
 def test_every_controlled_call_returns_a_proper_mesh(mesh, controls):
     """With parts of all kinds that are to be kept, and a length at every vertex."""
-    V, F = zoo.ZOO[mesh["name"]].make()
-    L = mesh["factor"] * zoo.mean_edge(V, F)
-    V, F = zoo.perturb(V, F, mesh["amount"], mesh["seed"])
+    V, F, L = made(mesh)
     used = np.array(topology.proper(F))
     kept = wishes(used, controls)
     for name in ("fixed_faces", "face_labels"):  # in terms of the faces that are whole
@@ -358,9 +361,7 @@ def test_every_controlled_call_returns_a_proper_mesh(mesh, controls):
     if controls["varies"]:
         L = L * (1 + 0.5 * np.sin(3 * V[:, 0] + V[:, 1]))
     result = remesh(V, F, L, **kept)
-    assert_proper(result, F)
-    if zoo.ZOO[mesh["name"]].is_tidy:
-        assert shape_of(result.F) == shape_of(F)
+    assert_proper(result, F, zoo.ZOO[mesh["name"]].is_tidy)
     claimed = np.flatnonzero(result.vertex_map >= 0)
     assert np.array_equal(result.V[result.vertex_map[claimed]], V[claimed])
     if "fixed_vertices" in kept:
