@@ -128,7 +128,7 @@ def test_a_table_that_a_spreadsheet_saved(folder, calls, capsys):
         capsys.readouterr()
         assert here() == 2
         error = capsys.readouterr().err
-        assert error.count("\n") == 1 and f"'{wrong}' stands in line" in error
+        assert error.count("\n") == 1 and f"'{wrong}' in line" in error
         assert "faces_before" in error and wrong in path.read_text()
     path.write_bytes(content.encode("utf-16"))
     assert here() == 2
@@ -216,7 +216,7 @@ def test_an_interrupted_batch_leaves_nothing_half_done_and_goes_on(kind, tmp_pat
     for name in found:
         assert len(read_mesh(f"out/{name}").F) > 500
     if kind == "SIGINT":
-        assert "the same command continues" in errors
+        assert "run the same command again to continue" in errors
     times = {name: os.stat(f"out/{name}").st_mtime_ns for name in done}
     assert main([*words, "--quiet"]) == 0
     assert len(table()) == len(outputs()) == MANY

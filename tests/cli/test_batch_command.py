@@ -96,7 +96,7 @@ def test_names_keep_what_the_patterns_do_not_share(folder):
     ("words", "reason"),
     [
         (["in/*.stl"], "in/*.stl: there is no such mesh file"),
-        (["in/a"], "in/a is a folder; say 'in/a/*.obj'"),
+        (["in/a"], "in/a is a folder; use 'in/a/*.obj'"),
         (["in/a/*.obj", "--out", "in/a"], "in/a/x.obj is an input"),
         (["in/**/*.obj", "--out", "in", "--format", "obj"], "is an input"),
         (["in/a/*.obj", "in/a/x.ply", "--format", "off"], "in/a/x.obj goes there"),

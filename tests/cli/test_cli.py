@@ -169,7 +169,7 @@ def test_notices_and_dirt_are_shown(sheet, capsys):
     [
         (["missing.obj"], "cannot read missing.obj: there is no such file"),
         (["broken.obj"], "cannot read broken.obj: 'f 1' is not a face"),
-        (["in.obj", "-o", "out.xyz"], "cannot write out.xyz: the suffix '.xyz' is none of"),
+        (["in.obj", "-o", "out.xyz"], "cannot write out.xyz: the suffix '.xyz' is not one of"),
         (["in.obj", "-o", "none/out.obj"], "cannot write none/out.obj: there is no folder"),
         (["in.obj", "-o", "folder.obj"], "cannot write folder.obj: it is a folder"),
         (["in.obj", "--save-stats", "none/s.json"], "there is no folder"),

@@ -237,7 +237,7 @@ def test_check_writable(tmp_path):
     check_writable(tmp_path / "stats.txt")
     (tmp_path / "folder.obj").mkdir()
     for name, reason in [
-        ("a.mesh", "none of .obj"),
+        ("a.mesh", "not one of .obj"),
         ("missing/a.obj", "no folder"),
         ("folder.obj", "it is a folder"),
         ("a" * 300 + ".obj", "name too long"),
@@ -250,7 +250,7 @@ def test_check_writable(tmp_path):
 
 def test_check_writable_in_a_folder_without_permission(tmp_path, monkeypatch):
     monkeypatch.setattr("os.access", lambda *_: False)  # root may write everywhere
-    with pytest.raises(MeshFormatError, match="cannot be written to"):
+    with pytest.raises(MeshFormatError, match="is not writable"):
         check_writable(tmp_path / "a.obj")
 
 

@@ -44,7 +44,7 @@ def test_seams_collapse_on_all_sheets(name):
         assert sum(after.values()) <= sum(before.values()) - 2 * done
         collapse_short_edges(mesh, one_block(mesh), limits, False)
         assert_valid(mesh, slits=True)
-        assert sheets_at_places(mesh) == after, "seams are none of its business"
+        assert sheets_at_places(mesh) == after, "it must not touch seams"
     assert total > 0
     # A curve of k sheets is still one of k sheets: siblings vanished together.
     assert set(sheets_at_places(mesh).values()) == set(before.values())
