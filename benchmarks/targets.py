@@ -56,10 +56,8 @@ def as_table(results: Results) -> str:
         rows.append([name, target.what, _figure(target), f"{sign} {target.bound:g}{target.unit}"])
     missed = sum(target.measured is not None and not target.is_met for target in targets)
     unknown = sum(target.measured is None for target in targets)
-    said = (
-        f"{len(targets) - missed - unknown} of {len(targets)} met, {missed} missed (in bold, by how"
-    )
-    said += f" much in parentheses), {unknown} not measured."
+    said = f"{len(targets) - missed - unknown} of {len(targets)} met, {missed} missed (in bold, with the"
+    said += f" difference in parentheses), {unknown} not measured."
     return f"{said}\n\n" + table(["", "", "measured", "target"], rows, text_columns=2)
 
 
