@@ -195,15 +195,16 @@ def _page(
         machine_line(facts),
         "## The command",
         "`remeshvec batch 'in/*' --out out`, from start to end of the process: read, remesh, measure "
-        f"quality, write. All runs: {GOOD} good, 5 failed, and named:",
+        f"quality, write. Every run remeshed {GOOD} meshes and named the 5 that failed:",
         "\n".join(f"- {Path(k).name}: {_said(e)}" for k, e in sorted(runs[0]["failures"].items())),
         _command_table(commands),
         "## Memory of the command",
-        "Resident, in MB, at parts of the time; workers are summed, and share their libraries.",
+        "Resident memory in MB at shares of the run time. Workers are added up, although they share "
+        "their libraries.",
         _memory_table(commands),
         "## From Python",
         "`remesh_many` on arrays in memory, and the same with threads, whose Python parts wait for each "
-        "other. Starting workers is inside the time.",
+        "other. The time includes the start of the workers.",
         _call_table(calls),
     )
 
@@ -221,7 +222,7 @@ def _command_table(commands: dict[int, list[Any]]) -> str:
         seconds = [run["seconds"] for run in runs]
         rate = 500 / median(seconds)
         rows.append([str(workers), _spread(seconds), f"{rate:.0f}", _times(one, seconds)])
-    return table(["workers", "seconds", "meshes a second", "times faster"], rows)
+    return table(["workers", "seconds", "meshes per second", "times faster"], rows)
 
 
 def _memory_table(commands: dict[int, list[Any]]) -> str:

@@ -56,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         machine_line(machine(("scipy",))),
         "## The report's four simulations",
         "Fluid held by three wires, edge lengths "
-        f"{', '.join(f'{L:g}' for L in FINER)}; without remeshing the triangles of the start, each cut "
+        f"{', '.join(f'{L:g}' for L in FINER)}; without remeshing, the initial triangles, each cut "
         "into 16. Energies include the caps.",
         table(
             ["volume", "remeshing", "faces", "energy", "pressure", "parts", "s", "ended"],
@@ -66,9 +66,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         "## Time to an energy",
         "Seconds until the energy of the full volume falls below the given value, medians of "
         f"{REPEATS}, interleaved, one process each for Evolver. Native: `evolve`; Evolver with our "
-        "remesher: the same loop with `EvolverBackend`; refined: without remeshing, the triangles of the "
-        "start cut into 16 (Evolver: into 4, 16, 64 on the way); Evolver alone: its best script of those "
-        "in the source of this page, by the time at which it ends.",
+        "remesher: the same loop with `EvolverBackend`; refined: without remeshing, the initial "
+        "triangles cut into 16 (Evolver: into 4, 16, 64 on the way); Evolver alone: the script that ends "
+        "first, of those in the source of this page.",
         table(["", *(f"{goal:,.0f}" for goal in GOALS), "lowest"], times()),
         "## The same triangles",
         agreement(),

@@ -105,7 +105,7 @@ def _all_cores(recipe: str, settings: str) -> Contender:
 
 _TRUEFORM = (
     "`isotropic_remeshed`, `iterations=5, relaxation_iters=1, lambda_=1`: the published work, one "
-    "full relaxation an iteration. The rest are its defaults, `preserve_boundary=True` among them: "
+    "full relaxation per iteration. The rest are its defaults, `preserve_boundary=True` among them: "
     "boundaries are neither split nor collapsed (`False` did not return from wolf_head)"
 )
 _MESHLIB = "`remesh`, `targetEdgeLen`, `packMesh`; it does not iterate"
@@ -181,7 +181,7 @@ CONTENDERS = {
             "meshlib",
             peers.meshlib,
             f"{_MESHLIB}; `projectOnOriginalMesh`, `finalRelaxIters=5`, `finalRelaxNoShrinkage`: "
-            "what comes closest to the work of the others",
+            "the closest to the work of the others",
             "new vertices, before relaxing",
             {"relaxations": 5, "project": True},
         ),
@@ -229,7 +229,7 @@ CONTENDERS = {
             "pyacvd",
             peers.pyacvd,
             "`Clustering.cluster` into as many clusters as equilateral faces with edges L have "
-            "vertices, after `subdivide` until the mesh has ten vertices a cluster",
+            "vertices, after `subdivide` until the mesh has ten vertices per cluster",
             "yes",
         ),
     )

@@ -168,9 +168,10 @@ def main(argv: Sequence[str] | None = None) -> None:
             [cost_row(name, options.rotations) for name in names],
         ),
         f"`Adaptive(tolerance)` on a unit sphere of 81,920 faces, {options.rotations} orientations, "
-        "mean (worst): faces over the optimum, the number of equilateral ones whose middles are off by "
-        "the tolerance; largest distance from the sphere of 91 samples per face, in tolerances; least "
-        "share of samples within it; largest ratio of target lengths along an edge (1.5 is allowed).",
+        "mean (worst): faces over the optimum, which is the number of equilateral faces whose "
+        "centres are off by the tolerance; largest distance from the sphere of 91 samples per face, in "
+        "tolerances; smallest share of samples within it; largest ratio of target lengths along an "
+        "edge (at most 1.5).",
         table(
             ("tolerance", "faces / optimum", "error / tolerance", "within %", "gradation"),
             sphere_rows(options.rotations),

@@ -239,10 +239,10 @@ def _page(
         machine_line(machine(("scipy",))),
         "## Inverting the Laplacian",
         "The report's experiment: solve with the Laplacian for as many right-hand sides as there are "
-        "vertices. The original has its Voronoi areas, so that its Laplacian is not symmetric, and "
-        "SuperLU; the remeshed surface has as many vertices, the same area for all, and a sparse "
-        "Cholesky factorisation: that of libigl, or CHOLMOD. Beside them the original once more as "
-        "`C x = M b`, which is symmetric without remeshing. One vertex of every component is fixed. "
+        "vertices. The original is solved with its Voronoi areas, which make the Laplacian unsymmetric, "
+        "and SuperLU. The remeshed surface has as many vertices; it is solved with the same area for all "
+        "and a sparse Cholesky factorisation, libigl's or CHOLMOD. For comparison, the original is also "
+        "solved as `C x = M b`, which is symmetric without remeshing. One vertex per component is fixed. "
         f"Medians of {REPEATS}; totals are the factor and n / {BLOCK} blocks of {BLOCK} columns.",
         table(
             [
@@ -272,8 +272,8 @@ def _page(
         ),
         "## The error of uniform areas",
         f"Largest relative error of the first {N_EIGENVALUES} to {N_EIGENVALUES + 4} eigenvalues that "
-        "are not 0: of the sphere against l (l + 1), of other meshes, where nothing exact is known, "
-        "between uniform and Voronoi areas.",
+        "are not 0: for the sphere against l (l + 1); for other meshes, whose exact eigenvalues are "
+        "unknown, between uniform and Voronoi areas.",
         table(
             ["mesh", "faces", "Voronoi areas %", "uniform areas %"],
             [

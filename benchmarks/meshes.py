@@ -75,6 +75,12 @@ def load(name: str) -> Sample:
     return Sample(name, V, F, float(match["factor"] or LENGTH_FACTOR) * mean)
 
 
+def load_arrays(name: str) -> tuple[FloatArray, IntArray]:
+    """Read or make only the vertices and faces of a mesh."""
+    sample = load(name)
+    return sample.V, sample.F
+
+
 @cache
 def _arrays(file: str, times: int) -> tuple[FloatArray, IntArray, float]:
     """Vertices, faces, and mean edge length."""

@@ -44,7 +44,7 @@ RATIOS = (
 )
 INTRO = (
     "L = 0.9 x the mean edge length of the input unless stated otherwise, the same for all. "
-    "Contenders run warm, in turns (A B C A B C ...), each in a process of its own; one core "
+    "Contenders run warm, in turns (A B C A B C ...), each in a separate process; one core "
     "means bound to one core. Arrays in, arrays out. Medians of five turns, unless a number of turns is "
     "given. `-x16`: the input cut into 16 times the faces, vertices moved at random within their faces; "
     "`@0.5`: L = 0.5 x the mean edge."
@@ -54,7 +54,7 @@ HOW = """## How to measure
 
 ```sh
 pip install -e '.[peers]'            # every library is optional; absent ones are named above
-export REMESHVEC_PMP=~/pmp/remesh    # optional, too
+export REMESHVEC_PMP=~/pmp/remesh    # also optional
 python -m benchmarks                 # all parts, the most important first
 python -m benchmarks targets         # those that the table of targets needs
 python -m benchmarks large threads   # some; --help lists them and what they take
@@ -161,7 +161,7 @@ def _report_table(entries: dict[str, Entry]) -> str:
             ]
         )
     if not rows:
-        return "Its meshes are not part of this repository and were not there."
+        return "Its meshes are not part of this repository and were not available."
     head = ["mesh", "faces", "report's Python *", "PMP as the report has it *"]
     return (
         "Milliseconds. Columns with * are quoted from the report, which measured them elsewhere; the "
@@ -199,8 +199,8 @@ def _memory(entries: dict[str, Entry]) -> str:
         return ""
     head = ["", "faces", "arrays, GB", "before the call, GB", "peak, GB", "seconds"]
     return (
-        "The first call of a fresh process on the largest mesh: the arrays themselves, peak memory of "
-        "the process before (libraries and the mesh) and after the call.\n\n" + table(head, rows)
+        "The first call of a fresh process on the largest mesh: size of the arrays, and peak memory of "
+        "the process before the call (libraries and mesh) and after it.\n\n" + table(head, rows)
     )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
 import io
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -97,6 +99,20 @@ def draw(path: Path, picture: Picture, largest: int = LARGEST) -> None:
     write_file(path, content.getvalue())
 
 
+def read_arguments(
+    argv: Sequence[str] | None, prog: str, about: str | None, known: Iterable[str], folder: Path
+) -> argparse.Namespace:
+    """Read the names of pictures, each of which must be known, and the folder to write them to."""
+    parser = argparse.ArgumentParser(prog=f"python -m {prog}", description=about)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(known))
+    parser.add_argument("--output", type=Path, default=folder)
+    arguments = parser.parse_args(argv)
+    unknown = set(arguments.names) - set(known)
+    if unknown:
+        parser.error(f"no picture {', '.join(sorted(unknown))}; there are {', '.join(known)}")
+    return arguments
+
+
 # --- colours -------------------------------------------------------------------------------------
 
 
@@ -130,6 +146,27 @@ def borders(F: IntArray, labels: NDArray[Any] | None = None) -> IntArray:
         squares = np.bincount(index.ravel(), label**2, len(unique))
         chosen |= total**2 != uses * squares  # equal only where all labels are
     return unique[chosen]
+
+
+def kept_faces(result: Any, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Mark the faces of a result that are chosen faces of the input, untouched."""
+    kept = np.zeros(len(result.F), np.bool_)
+    kept[result.face_map[chosen]] = True
+    return kept
+
+
+def face_distances(V: FloatArray, F: IntArray, result: Any) -> FloatArray:
+    """Distance of every face from the input: at its middle or at that of an edge, the largest."""
+    corners = result.V[result.F]
+    points = [corners.mean(axis=1), *np.moveaxis(corners + np.roll(corners, 1, axis=1), 1, 0) / 2]
+    return np.max([distances(P, V, F) for P in points], axis=0)
+
+
+def distances(P: FloatArray, V: FloatArray, F: IntArray) -> FloatArray:
+    """Distance of points from a mesh."""
+    import igl
+
+    return np.sqrt(igl.point_mesh_squared_distance(np.ascontiguousarray(P), V, F)[0])
 
 
 def cut_open(panel: Panel, normal: FloatArray, level: float) -> Panel:

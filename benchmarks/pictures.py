@@ -8,7 +8,6 @@ that were held.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,7 +21,7 @@ from remeshvec import Adaptive, remesh
 from remeshvec.files.data_files import read_data
 
 from .films import catenoid, cube, rings, splitting
-from .meshes import load
+from .meshes import load_arrays
 from .panels import (
     FloatArray,
     IntArray,
@@ -33,6 +32,9 @@ from .panels import (
     by_label,
     cut_open,
     draw,
+    face_distances,
+    kept_faces,
+    read_arguments,
 )
 from .scenes import bend, bump, smoothing, twist
 from .tables import DOCS
@@ -42,7 +44,7 @@ DATA = Path(__file__).resolve().parents[1] / "data"
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Make the pictures asked for."""
-    arguments = _parse(argv)
+    arguments = read_arguments(argv, "benchmarks.pictures", __doc__, PICTURES, DOCS / "pictures")
     for name in arguments.names or PICTURES:
         path = arguments.output / f"{name}.png"
         draw(path, PICTURES[name]())
@@ -52,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def features() -> Picture:
     """Creases of a CAD part, found or not."""
-    V, F = _load("bracket")
+    V, F = load_arrays("bracket")
     panels = [Panel("input", V, F)]
     for angle in ("auto", None):
         result = remesh(V, F, 3.0, feature_angle=angle)
@@ -73,7 +75,7 @@ def boundary() -> Picture:
 
 def adaptive() -> Picture:
     """Edge lengths that follow curvature."""
-    V, F = _load("creature")
+    V, F = load_arrays("creature")
     panels = [_panel("L=0.05", remesh(V, F, 0.05))]
     for tolerance in (0.01, 0.003):
         result = remesh(V, F, Adaptive(tolerance))
@@ -94,12 +96,11 @@ def labels() -> Picture:
 
 def selection() -> Picture:
     """Only a part is remeshed."""
-    V, F = _load("creature")
+    V, F = load_arrays("creature")
     centres = V[F].mean(axis=1)
     chosen = (centres[:, 0] > 0.38) & (centres[:, 2] > 0.85)
     result = remesh(V, F, 0.03, selection=chosen)
-    is_new = np.ones(len(result.F), np.bool_)
-    is_new[result.face_map[~chosen]] = False
+    is_new = ~kept_faces(result, ~chosen)
     panels = [
         Panel("selection", V, F, by_label(np.where(chosen, 1, -1)), borders(F, chosen)),
         Panel("remeshed", *result, by_label(np.where(is_new, 1, -1)), borders(result.F, is_new)),
@@ -120,11 +121,11 @@ def non_manifold() -> Picture:
 
 def max_deviation() -> Picture:
     """Faces as large as asked for, but where these would leave the input."""
-    V, F = _load("creature")
+    V, F = load_arrays("creature")
     panels = []
     for bound in (None, 0.008):
         result = remesh(V, F, 0.16, max_deviation=bound)
-        away = _deviations(V, F, result)
+        away = face_distances(V, F, result)
         note = f", at most {away.max():.3f} away from the input"
         colours = by_amount(away, 0.03)
         panels.append(_panel(f"L=0.16, max_deviation={bound}", result, colours, note=note))
@@ -133,7 +134,7 @@ def max_deviation() -> Picture:
 
 def thin_sheet() -> Picture:
     """Two sides a fifth of an edge apart."""
-    V, F = _load("thin_sheet")
+    V, F = load_arrays("thin_sheet")
     result = remesh(V, F, 0.08)
     near = (result.V * [1.0, -1.0, 0.0]).sum(axis=1).argmax()  # the corner at the right in front
     after = _panel("remeshed, L=0.08", result)
@@ -163,11 +164,6 @@ def texture() -> Picture:
 
 
 # --- parts of pictures ---------------------------------------------------------------------------
-
-
-def _load(name: str) -> tuple[FloatArray, IntArray]:
-    sample = load(name)
-    return sample.V, sample.F
 
 
 def _panel(
@@ -212,16 +208,6 @@ def _like(V: FloatArray, F: IntArray, given: IntArray, result: Any) -> IntArray:
     return votes.argmax(axis=1)[found]
 
 
-def _deviations(V: FloatArray, F: IntArray, result: Any) -> FloatArray:
-    """Distance from the input of every face's middle and the middles of its edges, the largest."""
-    import igl
-
-    corners = result.V[result.F]
-    points = [corners.mean(axis=1), *np.moveaxis(corners + np.roll(corners, 1, axis=1), 1, 0) / 2]
-    squares = [igl.point_mesh_squared_distance(np.ascontiguousarray(P), V, F)[0] for P in points]
-    return np.sqrt(np.max(squares, axis=0))
-
-
 PICTURES: dict[str, Callable[[], Picture]] = {
     function.__name__: function
     for function in (
@@ -244,17 +230,6 @@ PICTURES: dict[str, Callable[[], Picture]] = {
         splitting,
     )
 }
-
-
-def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.pictures", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(PICTURES))
-    parser.add_argument("--output", type=Path, default=DOCS / "pictures")
-    arguments = parser.parse_args(argv)
-    unknown = set(arguments.names) - set(PICTURES)
-    if unknown:
-        parser.error(f"no picture {', '.join(sorted(unknown))}; there are {', '.join(PICTURES)}")
-    return arguments
 
 
 if __name__ == "__main__":

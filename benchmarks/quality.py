@@ -119,7 +119,7 @@ def _targets_part(aimed: list[Entry], missed: int, titles: list[str]) -> str:
     return "\n\n".join(
         (
             "## Default preset beside its targets",
-            f"Measured / target; by how much in parentheses where it is missed: {missed} missed.",
+            f"Measured / target, with the difference in parentheses if it is missed: {missed} missed.",
             table(["mesh", *titles], [[e.mesh, *_beside_targets(e)] for e in aimed]),
         )
     )

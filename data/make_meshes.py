@@ -16,7 +16,7 @@ from pathlib import Path
 
 import igl
 import numpy as np
-from shapes import sculpted
+from shapes import bracket, sculpted
 from shapes.sculpted import Floats, Ints
 
 HERE = Path(__file__).resolve().parent
@@ -29,7 +29,7 @@ MESHES: dict[
     str, tuple[Callable[[], tuple[Floats | Ints, ...]], int]
 ] = {  # name -> maker, decimals
     "creature.obj": (sculpted.creature, 5),
-    "bracket.obj": (sculpted.bracket, 6),
+    "bracket.obj": (bracket.bracket, 6),
     "wavy_sheet.obj": (sculpted.wavy_sheet, 5),
     "pretzel.off": (sculpted.pretzel, 5),
     "linked_rings.off": (sculpted.linked_rings, 5),

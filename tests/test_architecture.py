@@ -1,12 +1,10 @@
 """The house: folders import folders below them only, files are short, `import remeshvec` is light."""
 
 import ast
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from helpers.processes import run_python
 
 import remeshvec
 
@@ -164,18 +162,6 @@ def test_kernels_never_raise():
             assert not bad, f"{name}: {function.name}"
 
 
-def python(code, **env):
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, "PYTHONPATH": str(ROOT), **env},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split()
-
-
 def test_public_names_are_those_listed():
     """`dir` shows what `__all__` lists, and every name in it is there."""
     assert set(dir(remeshvec)) == {*remeshvec.__all__, "__version__", "evolver", "html_page", "viz"}
@@ -185,7 +171,7 @@ def test_public_names_are_those_listed():
 
 
 def test_import_is_light():
-    loaded = set(python("import remeshvec, sys; print(*sys.modules)"))
+    loaded = set(run_python("-c", "import remeshvec, sys; print(*sys.modules)").stdout.split())
     # Numba itself imports the package scipy, to see that it is there, but none of its parts.
     parts = {"scipy.sparse", "scipy.spatial", "scipy.linalg", "scipy.special", "scipy.stats"}
     others = {
@@ -210,4 +196,4 @@ def test_a_call_needs_neither_scipy_nor_libigl():
         "V, F = remesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], 0.5)\n"
         "print(*sys.modules)"
     )
-    assert not {"scipy.sparse", "scipy.spatial", "igl"} & set(python(code))
+    assert not {"scipy.sparse", "scipy.spatial", "igl"} & set(run_python("-c", code).stdout.split())

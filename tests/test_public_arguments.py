@@ -21,9 +21,10 @@ from helpers.bad_arguments import (
     NOT_TEXTS,
     NOT_WORDS,
     Entry,
+    assert_complete,
+    called,
     cases,
     name_of,
-    parameters,
     public_methods,
 )
 from helpers.bad_arguments import NOT_FLAGS as NOT_FLAGS_OR_NONE
@@ -243,15 +244,7 @@ def test_every_public_function_is_in_one_table(place):
 
 @pytest.mark.parametrize("function", TABLE, ids=name_of)
 def test_every_parameter_has_bad_values(function):
-    known = inspect.signature(function).parameters
-    own = {name for name in parameters(function) if known[name].kind is not known[name].VAR_KEYWORD}
-    assert set(TABLE[function].bad) == own
-
-
-def called(function, arguments):
-    """Call a function, and use up what it returns."""
-    out = function(**arguments)
-    return list(out) if inspect.isgenerator(out) else out
+    assert_complete(TABLE, function)
 
 
 @pytest.mark.parametrize("function", [f for f in TABLE if f not in WINDOWS], ids=name_of)

@@ -128,6 +128,28 @@ def sliver_fan(n: int = 50) -> Arrays:
     return np.vstack([V, [[0.3, 0, 0]]]), fan(np.arange(n), n)
 
 
+def disc(n: int, radius: float = 1.0) -> Arrays:
+    """Flat disc, a fan of n faces."""
+    return fan_inside(radius * np.stack([np.cos(turn(n)), np.sin(turn(n))], axis=1))
+
+
+def polygon(points, spacing: float) -> Arrays:
+    """Flat disc inside a polygon, each side cut into equal edges of about a spacing."""
+    P = np.array(points, float)
+    rim = []
+    for a, b in zip(P, np.roll(P, -1, axis=0), strict=True):
+        n = max(1, round(np.linalg.norm(b - a) / spacing))
+        rim += [a + (b - a) * i / n for i in range(n)]
+    return fan_inside(np.array(rim))
+
+
+def fan_inside(rim: np.ndarray) -> Arrays:
+    """Join a plane rim (n, 2) to one vertex: to (0.7, 0.7) if it lies in the first quadrant."""
+    middle = [0.7, 0.7] if rim.min() >= 0 else rim.mean(axis=0)
+    V = np.vstack([rim, middle])
+    return np.column_stack([V, np.zeros(len(V))]), fan(np.arange(len(rim)), len(rim))
+
+
 def l_prism() -> Arrays:
     """Prism over an L: planar faces, convex and concave creases."""
     base = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]

@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.panels import draw
+from benchmarks.panels import draw, read_arguments
 
 from . import kept, lengths, plots, sweeps
 
@@ -27,13 +26,7 @@ LARGEST = 150_000  # bytes of a file
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Make the pictures asked for."""
-    parser = argparse.ArgumentParser(prog="python -m docs.gallery", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(NAMES))
-    parser.add_argument("--output", type=Path, default=FOLDER)
-    arguments = parser.parse_args(argv)
-    unknown = set(arguments.names) - set(NAMES)
-    if unknown:
-        parser.error(f"no picture {', '.join(sorted(unknown))}; there are {', '.join(NAMES)}")
+    arguments = read_arguments(argv, "docs.gallery", __doc__, NAMES, FOLDER)
     for name in arguments.names or NAMES:
         path = arguments.output / f"{name}.png"
         if name in PLOTS:

@@ -6,16 +6,26 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from benchmarks.panels import FloatArray, IntArray, Panel, Picture, borders, by_amount, by_label
+from benchmarks.meshes import load_arrays
+from benchmarks.panels import (
+    FloatArray,
+    IntArray,
+    Panel,
+    Picture,
+    borders,
+    by_amount,
+    by_label,
+    kept_faces,
+)
 from data.shapes.drawn import flag, notched_sheet
 from remeshvec import remesh
 
-from .scene import BRACKET, CREATURE, SHEET, mesh, panel, side_by_side
+from .scene import BRACKET, CREATURE, SHEET, panel, side_by_side
 
 
 def feature_angle() -> Picture:
     """Creases of a part, found or not."""
-    V, F = mesh("bracket")
+    V, F = load_arrays("bracket")
     panels = [
         panel(f"feature_angle={angle!r}", remesh(V, F, 4.0, feature_angle=angle))
         for angle in ("auto", None)
@@ -25,7 +35,7 @@ def feature_angle() -> Picture:
 
 def feature_edges() -> Picture:
     """Keep a path drawn on the surface."""
-    V, F = mesh("wavy_sheet")
+    V, F = load_arrays("wavy_sheet")
     start, end = (np.linalg.norm(V[:, :2] - P, axis=1).argmin() for P in ([0.6, 0.5], [6.4, 3.4]))
     path = shortest_path(V, F, int(start), int(end))
     result = remesh(V, F, 0.25, feature_edges=path)
@@ -38,7 +48,7 @@ def feature_edges() -> Picture:
 
 def fixed_vertices() -> Picture:
     """Vertices that keep their places."""
-    V, F = mesh("wavy_sheet")
+    V, F = load_arrays("wavy_sheet")
     turn = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     places = np.column_stack([3.5 + 1.8 * np.cos(turn), 0.8 + 0.6 * np.sin(turn)])
     chosen = np.unique([np.linalg.norm(V[:, :2] - P, axis=1).argmin() for P in places])
@@ -52,12 +62,11 @@ def fixed_vertices() -> Picture:
 
 def fixed_faces() -> Picture:
     """Faces that stay as they are."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     middles = V[F].mean(axis=1)
     chosen = middles[:, 2] < 0.35
     result = remesh(V, F, 0.1, fixed_faces=chosen)
-    stayed = np.zeros(len(result.F), np.bool_)
-    stayed[result.face_map[chosen]] = True
+    stayed = kept_faces(result, chosen)
     panels = [
         Panel("fixed_faces on the input", V, F, by_label(np.where(chosen, 1, -1))),
         panel("result.face_map[fixed_faces]", result, by_label(np.where(stayed, 1, -1))),
@@ -94,7 +103,7 @@ def return_result() -> Picture:
     """Remesh an object of trimesh, which carries a field; the field in colour."""
     import trimesh
 
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     before = trimesh.Trimesh(V, F, process=False)
     before.vertex_attributes["field"] = np.cos(8 * V[:, 0]) ** 2
     after, result = remesh(before, 0.08, return_result=True)
@@ -120,12 +129,11 @@ def torus(nu: int = 60, nv: int = 24) -> tuple[FloatArray, IntArray, FloatArray]
 
 def selection() -> Picture:
     """Only a part is remeshed."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     middles = V[F].mean(axis=1)
     chosen = (middles[:, 0] > 0.38) & (middles[:, 2] > 0.85)
     result = remesh(V, F, 0.05, selection=chosen)
-    is_new = np.ones(len(result.F), np.bool_)
-    is_new[result.face_map[~chosen]] = False
+    is_new = ~kept_faces(result, ~chosen)
     panels = [
         Panel("selection on the input", V, F, by_label(np.where(chosen, 1, -1))),
         panel("selection=chosen", result, by_label(np.where(is_new, 1, -1))),

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.panels import Panel, Picture, by_amount
+from benchmarks.meshes import load_arrays
+from benchmarks.panels import Panel, Picture, by_amount, face_distances
 from remeshvec import Adaptive, remesh
 
-from .scene import CREATURE, SHEET, distances, mesh, panel, side_by_side
+from .scene import CREATURE, SHEET, panel, side_by_side
 
 
 def L() -> Picture:
     """One length for all edges, and two."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     return side_by_side([panel(f"L={L}", remesh(V, F, L)) for L in (0.06, 0.15)], CREATURE)
 
 
 def L_array() -> Picture:
     """Give a length at every vertex, and a function of points."""
-    V, F = mesh("wavy_sheet")
+    V, F = load_arrays("wavy_sheet")
     away = np.linalg.norm(V[:, :2] - [3.5, 0.8], axis=1)
     panels = [
         panel("L=0.06 + 0.12 * away (an array)", remesh(V, F, 0.06 + 0.12 * away)),
@@ -29,14 +30,14 @@ def L_array() -> Picture:
 
 def adaptive() -> Picture:
     """Lengths from the curvature."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     panels = [panel(f"L=Adaptive({t})", remesh(V, F, Adaptive(t))) for t in (0.02, 0.006)]
     return side_by_side(panels, CREATURE)
 
 
 def gradation() -> Picture:
     """How fast lengths may grow."""
-    V, F = mesh("wavy_sheet")
+    V, F = load_arrays("wavy_sheet")
     near = np.linalg.norm(V[:, :2] - [3.5, 0.8], axis=1) < 0.1
     L = np.where(near, 0.03, 0.3)
     panels = [panel(f"gradation={ratio}", remesh(V, F, L, gradation=ratio)) for ratio in (1.2, 3.0)]
@@ -45,14 +46,14 @@ def gradation() -> Picture:
 
 def n_faces() -> Picture:
     """Numbers of faces."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     panels = [panel(f"n_faces={n}", remesh(V, F, n_faces=n)) for n in (600, 3000)]
     return side_by_side(panels, CREATURE)
 
 
 def n_vertices() -> Picture:
     """Numbers of vertices."""
-    V, F = mesh("pretzel")
+    V, F = load_arrays("pretzel")
     results = {n: remesh(V, F, n_vertices=n) for n in (400, 1600)}
     panels = [
         panel(f"n_vertices={n}", result, note=f", {len(result.V):,} vertices")
@@ -63,11 +64,11 @@ def n_vertices() -> Picture:
 
 def max_deviation() -> Picture:
     """Faces as large as asked for, but where these would leave the input."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     panels: list[Panel] = []
     for bound in (None, 0.01):
         result = remesh(V, F, 0.16, max_deviation=bound)
-        away = distances(V, F, result)
+        away = face_distances(V, F, result)
         note = f", up to {away.max():.3f} away"
         colours = by_amount(away, 0.03)
         panels.append(panel(f"L=0.16, max_deviation={bound}", result, colours, note))

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.meshes import load_arrays
 from remeshvec import OptionError, remesh
 
-from .scene import lengths, mesh
+from .scene import lengths
 
 SIZE, DPI = (7.0, 2.7), 120
 OURS, LOUD = "#1565c0", "#c2185b"
@@ -33,7 +34,7 @@ def draw_plot(path: Path, plot: Any, largest: int) -> None:
 
 def tol(axes: Any) -> None:
     """Edges that every sweep changes, and where ``tol`` ends the call."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     for choice, colour, width in ((None, OURS, 4.5), (0.05, LOUD, 1.8)):
         result = remesh(V, F, 0.06, tol=choice)
         n_edges = 1.5 * len(result.F)
@@ -47,7 +48,7 @@ def tol(axes: Any) -> None:
 
 def callback(axes: Any) -> None:
     """Plot counts as ``callback`` sees them, phase by phase."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     seen: dict[str, list[int]] = {}
     remesh(V, F, 0.06, callback=lambda sweep, phase, n: seen.setdefault(phase, []).append(n))
     for phase, colour in (("split", OURS), ("collapse", LOUD), ("flip", "#2e7d32")):
@@ -59,7 +60,7 @@ def callback(axes: Any) -> None:
 
 def max_faces(axes: Any) -> None:
     """Faces against the length; beyond ``max_faces`` a call is refused before any work."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     limit, refused = 10_000, []
     for L in np.geomspace(0.15, 0.02, 9):
         try:

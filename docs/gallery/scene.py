@@ -1,4 +1,4 @@
-"""What the scripts of the gallery share: meshes of ``data``, panels, colours that measure faces."""
+"""What the scripts of the gallery share: views, panels, colours that measure faces."""
 
 from __future__ import annotations
 
@@ -6,19 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.meshes import load
 from benchmarks.panels import FloatArray, IntArray, Panel, Picture, by_amount
 
 CREATURE = (20.0, 15.0)  # views: degrees to the right of the front, upwards
 BRACKET = (35.0, 30.0)
 SHEET = (0.0, 55.0)
 WIDTH = 900  # pixels of a picture
-
-
-def mesh(name: str) -> tuple[FloatArray, IntArray]:
-    """Vertices and faces of a mesh in ``data``."""
-    sample = load(name)
-    return sample.V, sample.F
 
 
 def side_by_side(panels: list[Panel], view: tuple[float, float], columns: int = 2) -> Picture:
@@ -53,21 +46,3 @@ def by_length(result: Any, low: float = 0.8, high: float = 4 / 3) -> Any:
     ratio = np.log(lengths(result.V, result.F) / result.report.target_length)
     outside = np.maximum(ratio - np.log(high), np.log(low) - ratio).max(axis=1)
     return by_amount(np.maximum(outside, 0.0), 0.25)
-
-
-def distances(V: FloatArray, F: IntArray, result: Any) -> FloatArray:
-    """Distance from the input of every face's middle and those of its edges, the largest."""
-    corners = result.V[result.F]
-    points = [corners.mean(axis=1), *np.moveaxis(corners + np.roll(corners, 1, axis=1), 1, 0) / 2]
-    return np.max([_distance(P, V, F) for P in points], axis=0)
-
-
-def vertex_distances(V: FloatArray, F: IntArray, result: Any) -> FloatArray:
-    """Distance of every vertex of the result from the input."""
-    return _distance(result.V, V, F)
-
-
-def _distance(P: FloatArray, V: FloatArray, F: IntArray) -> FloatArray:
-    import igl
-
-    return np.sqrt(igl.point_mesh_squared_distance(np.ascontiguousarray(P), V, F)[0])

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.panels import Panel, Picture, by_amount
+from benchmarks.meshes import load_arrays
+from benchmarks.panels import Panel, Picture, by_amount, distances, face_distances
 from data.shapes.hard import thin_ring
 from remeshvec import remesh
 
@@ -15,18 +16,15 @@ from .scene import (
     SHEET,
     by_angle,
     by_length,
-    distances,
-    mesh,
     panel,
     side_by_side,
     smallest_angles,
-    vertex_distances,
 )
 
 
 def preset() -> Picture:
     """Compare the presets: small angles in colour above, distance from the input below."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     results = {name: remesh(V, F, 0.09, preset=name) for name in ("fast", "default", "fine")}
     panels = []
     for name in ("fast", "default"):
@@ -66,11 +64,11 @@ def sliver_check() -> Picture:
 
 def project() -> Picture:
     """Vertices on the input, or where they drift to; their distance from it in colour."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     panels = []
     for choice in (True, False):
         result = remesh(V, F, 0.09, project=choice)
-        away = vertex_distances(V, F, result)
+        away = distances(result.V, V, F)
         colours = by_amount(away[result.F].mean(axis=1), 0.01)
         note = f", vertices up to {away.max():.3f} away"
         panels.append(panel(f"project={choice}", result, colours, note))
@@ -79,7 +77,7 @@ def project() -> Picture:
 
 def untangle_angle() -> Picture:
     """Improve bad triangles at the end, or not; faces with small angles in colour."""
-    V, F = mesh("wavy_sheet")
+    V, F = load_arrays("wavy_sheet")
     panels = []
     for angle in (1.0, 41.5):
         result = remesh(V, F, 0.4, untangle_angle=angle)
@@ -90,7 +88,7 @@ def untangle_angle() -> Picture:
 
 def fit() -> Picture:
     """Let faces straddle the input; their distance from it in colour."""
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     panels = [
         _distance_panel(f"fit={choice}", V, F, remesh(V, F, 0.09, fit=choice))
         for choice in (False, True)
@@ -114,7 +112,7 @@ def avoid_intersections() -> Picture:
 
 
 def _lengths(choices: list[dict[str, Any]]) -> Picture:
-    V, F = mesh("creature")
+    V, F = load_arrays("creature")
     panels = []
     for choice in choices:
         result = remesh(V, F, 0.09, **choice)
@@ -123,7 +121,7 @@ def _lengths(choices: list[dict[str, Any]]) -> Picture:
 
 
 def _distance_panel(caption: str, V: Any, F: Any, result: Any) -> Panel:
-    away = distances(V, F, result)
+    away = face_distances(V, F, result)
     note = f", {away.mean():.4f} away in the mean"
     return panel(caption, result, by_amount(away, 0.015), note)
 

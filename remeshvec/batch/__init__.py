@@ -1,1 +1,1 @@
-"""The pipeline for a file with its data, and for many meshes."""
+"""Remeshing of a file with its data, and of many meshes."""

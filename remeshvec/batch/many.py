@@ -41,7 +41,7 @@ class BatchItem:
     error : Exception, or None
         An error of `remesh` or `read_mesh`, or a `WorkerError`.
     seconds : float
-        Time in the worker process, with reading.
+        Time in the worker process, including reading.
     """
 
     index: int
@@ -79,15 +79,15 @@ def remesh_many(
         Number of processes; by default as many as there are cores. With 1, everything runs in this
         process. Each process uses its part of the cores for large meshes.
     on_error : {"raise", "collect"}
-        ``"raise"``: an item that fails ends the batch with an exception, for whatever reason it fails,
-        even if its process dies. ``"collect"``: it becomes a `BatchItem` with an ``error``, and the
-        others go on.
+        ``"raise"``: an item that fails for any reason ends the batch with an exception, even if its
+        process dies. ``"collect"``: it becomes a `BatchItem` with an ``error``, and the
+        batch goes on.
     ordered : bool
-        Whether results come in the order of the items, or as they are completed.
+        Whether results come in the order of the items, or in the order of completion.
     progress : bool
         Show progress on the error stream: a bar if the package rich is installed, lines otherwise.
     timeout : float, optional
-        Seconds that one item may take. After that, its process is ended and the item has failed. With a
+        Seconds that one item may take. After that, its process is ended and the item fails. With a
         timeout, even ``workers=1`` uses a process.
     **options
         Options of `remesh`. Functions among them (``L``, ``callback``) run in the workers; those that a
@@ -133,7 +133,7 @@ def remesh_many(
 
 
 class _Crew(NamedTuple):
-    """Which processes do the work, and how."""
+    """The processes that do the work, and their options."""
 
     workers: int
     is_here: bool  # in this process alone
@@ -163,10 +163,10 @@ def _check_names(options: Iterable[str]) -> None:
 def _with_names(items: Iterator[Any], options: dict[str, Any], crew: _Crew) -> Iterator[BatchItem]:
     """Remesh, and put back the names and arrays that the workers did not need.
 
-    Items wait for their worker while the caller makes the next one, perhaps in the same arrays: they are
-    copied.
+    Items are copied: they wait for their worker while the caller makes the next one, perhaps in the same
+    arrays.
     """
-    held: dict[int, tuple[str, Any]] = {}  # name and arrays of the items at work
+    held: dict[int, tuple[str, Any]] = {}  # name and arrays of the items in progress
 
     def tasks() -> Iterator[Any]:
         for index, item in enumerate(items):

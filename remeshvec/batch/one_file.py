@@ -21,7 +21,7 @@ __all__ = ["remesh_file", "with_feature_data"]
 def remesh_file(
     source: FilePath, target: FilePath, L: Any = None, **options: Unpack[RemeshKeywords]
 ) -> RemeshResult:
-    """Remesh a file with its colours, texture coordinates, fields and groups, if the formats hold them.
+    """Remesh a file with the colours, texture coordinates, fields and groups that its format holds.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ def bar(
     has_failed: Callable[[Item], bool],
     stream: TextIO | None = None,
 ) -> Iterator[Item]:
-    """Yield the items, and show on a stream how many there were."""
+    """Yield the items, and show their number on a stream."""
     stream = sys.stderr if stream is None else stream
     failed = 0
     try:
@@ -89,7 +89,7 @@ def _rich_progress(stream: TextIO, total: int | None) -> Any:
 
 
 class Lines:
-    """Plain text: one line that is rewritten on a terminal, or a line every `SECONDS` in a log."""
+    """Plain text: one line that is rewritten on a terminal, or one line per `SECONDS` in a log."""
 
     def __init__(self, stream: TextIO, total: int | None) -> None:
         self.stream, self.total = stream, total

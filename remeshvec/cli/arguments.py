@@ -21,11 +21,11 @@ __all__ = ["FILE_OPTIONS", "batch_parser", "given_options", "parse", "parser", "
 
 EPILOG = """\
 examples:
-  remeshvec cat.obj                                   show what remeshing brings
+  remeshvec cat.obj                                   show the effect of remeshing
   remeshvec cat.obj -o even.obj                       write the new mesh
   remeshvec part.stl -o part.ply --length 0.5         edges of length 0.5
   remeshvec cat.obj -o even.obj --picture even.png    and a picture of both
-  remeshvec cat.obj --html report.html                a page to look at and to send around
+  remeshvec cat.obj --html report.html                a page to read and to share
   remeshvec part.stl -o part.ply --feature-angle 30   keep edges that turn by more than 30 degrees
   remeshvec cat.obj -o fine.obj --adaptive 0.001      short edges where the surface is curved
 
@@ -39,13 +39,13 @@ examples:
   remeshvec batch 'in/*.obj' --out even                 all OBJ files of a folder
   remeshvec batch 'in/**/*.stl' --out even --format ply --table even.parquet
 
-The same command again goes on after an interrupt, repeats what failed, and what was made from another
-input or with other options.
+Run the same command again to continue after an interrupt. It repeats meshes that failed, and those made
+from another input or with other options.
 
 exit status: 0 all meshes are done, 3 some failed, 2 bad arguments, 130 interrupted
 """
 
-# Options of `remesh` whose flags name files of numbers, and how many columns these have.
+# Options of `remesh` whose flags name files of numbers, and the number of columns of these files.
 FILE_OPTIONS = {
     "feature_edges": 2,
     "fixed_vertices": 1,
@@ -60,9 +60,9 @@ def parser() -> argparse.ArgumentParser:
     result = argparse.ArgumentParser(
         prog="remeshvec",
         description="Remesh a triangle mesh to even triangles.\n"
-        "Reads and writes OBJ, OFF, PLY, STL, and JSON with the keys verts and faces; and what meshio\n"
-        "(VTK, VTU, Gmsh, XDMF, ...), pyvista (VTP) and trimesh (glTF) know, if installed.\n"
-        "Colours, texture coordinates, fields and groups come along if the format can hold them.",
+        "Reads and writes OBJ, OFF, PLY, STL, and JSON with the keys verts and faces; and the formats\n"
+        "of meshio (VTK, VTU, Gmsh, XDMF, ...), pyvista (VTP) and trimesh (glTF), if installed.\n"
+        "Colours, texture coordinates, fields and groups are kept if the format can hold them.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -79,7 +79,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def batch_parser() -> argparse.ArgumentParser:
-    """Return the parser of ``remeshvec batch``: all that does not name elements of one mesh."""
+    """Return the parser of ``remeshvec batch``: all arguments except elements of a single mesh."""
     result = argparse.ArgumentParser(
         prog="remeshvec batch",
         description="Remesh many triangle meshes, several at a time.",
@@ -90,13 +90,13 @@ def batch_parser() -> argparse.ArgumentParser:
         "inputs",
         metavar="INPUT",
         nargs="+",
-        help="mesh files, or patterns in quotes; ** stands for folders in folders",
+        help="mesh files, or patterns in quotes; ** stands for any folders",
     )
     result.add_argument(
         "--out",
         metavar="DIR",
         required=True,
-        help="folder to write to; folders of the inputs are kept below it",
+        help="folder to write to; keeps the folders of the inputs below it",
     )
     result.add_argument(
         "--format",
@@ -110,13 +110,13 @@ def batch_parser() -> argparse.ArgumentParser:
         "--timeout",
         type=_positive_number,
         metavar="S",
-        help="seconds after which a mesh is given up",
+        help="most seconds for a mesh; then it counts as failed",
     )
-    result.add_argument("--force", action="store_true", help="repeat also what is done")
+    result.add_argument("--force", action="store_true", help="repeat meshes that are done, too")
     result.add_argument(
         "--table",
         metavar="FILE",
-        help="table of results, .csv (default DIR/results.csv) or .parquet (beside that)",
+        help="table of results: .csv (default DIR/results.csv), or .parquet in addition",
     )
     result.add_argument("--quiet", action="store_true", help="show errors only")
     result.add_argument("--version", action="version", version=f"remeshvec {__version__}")
@@ -127,7 +127,7 @@ def batch_parser() -> argparse.ArgumentParser:
 
 
 def parse(parser: argparse.ArgumentParser, words: Sequence[str]) -> argparse.Namespace:
-    """Parse arguments, none of which may be empty: most often a variable of a script was not set."""
+    """Parse arguments and refuse empty ones: most often a variable of a script was not set."""
     options = parser.parse_args(words)
     for name, value in vars(options).items():
         if value == "" or (isinstance(value, list) and "" in value):
@@ -136,7 +136,7 @@ def parse(parser: argparse.ArgumentParser, words: Sequence[str]) -> argparse.Nam
 
 
 def target_length(options: argparse.Namespace, mesh: MeshFile) -> Any:
-    """Return the target length, None for the library's default or where a count is asked for."""
+    """Return the target length; None for the library's default, or if a count is given."""
     if options.adaptive is not None:
         return Adaptive(options.adaptive, options.min_length, options.max_length)
     if options.min_length is not None or options.max_length is not None:
@@ -147,13 +147,13 @@ def target_length(options: argparse.Namespace, mesh: MeshFile) -> Any:
 
 
 def given_options(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of `remesh` that were given, so that the presets decide on the others."""
+    """Return the options of `remesh` that were given, so that the preset sets the others."""
     given = {
         name: getattr(options, name)
         for name in OPTION_NAMES
         if name not in FILE_OPTIONS and getattr(options, name, None) is not None
     }
-    if options.feature_angle is None:  # "none", which is not the default
+    if options.feature_angle is None:  # "none" differs from the default
         given["feature_angle"] = None
     if options.no_project:
         given["project"] = False
@@ -163,7 +163,7 @@ def given_options(options: argparse.Namespace) -> dict[str, Any]:
 def _add_size_options(
     group: argparse._ArgumentGroup,
 ) -> argparse._MutuallyExclusiveGroup:
-    """Add them; returns those that exclude each other."""
+    """Add the flags; returns the group of those that exclude each other."""
     length = group.add_mutually_exclusive_group()
     length.add_argument("--length", type=_positive_number, metavar="L", help="target edge length")
     length.add_argument(
@@ -210,13 +210,13 @@ def _add_constraints(group: argparse._ArgumentGroup) -> None:
         type=_angle_or_word,
         default="auto",
         metavar="DEG",
-        help="keep edges that turn by more; auto: those that stand out (default), none: no edges",
+        help="keep edges that turn by more; auto: edges that stand out (default), none: no edges",
     )
     group.add_argument(
         "--boundary",
         choices=get_args(Boundary),
         default="free",
-        help="boundary vertices slide along it (free), stay and get new ones between (split), or "
+        help="boundary vertices slide along it (free), stay with new ones between them (split), or "
         "stay as they are (fixed)",
     )
 
@@ -226,7 +226,7 @@ def _add_files_of_constraints(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--fixed-vertices", metavar="FILE", help="vertices that stay")
     group.add_argument("--fixed-faces", metavar="FILE", help="faces that stay")
     group.add_argument(
-        "--selection", metavar="FILE", help="faces to remesh; all others stay and come first"
+        "--selection", metavar="FILE", help="faces to remesh; the others stay and come first"
     )
     group.add_argument(
         "--face-labels",
@@ -243,7 +243,7 @@ def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
         help="fast: the published algorithm; fine: more sweeps and a closer fit",
     )
     group.add_argument(
-        "--iterations", type=_at_least_one, metavar="N", help="number of sweeps at most"
+        "--iterations", type=_at_least_one, metavar="N", help="largest number of sweeps"
     )
     group.add_argument(
         "--tol",

@@ -1,4 +1,4 @@
-"""Arrays that go with a mesh on the command line: indices, labels and lengths in, results out."""
+"""Arrays for a mesh on the command line: indices, labels and lengths in, results out."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def read_array(path: str, columns: int = 1, whole: bool = True) -> NDArray[np.ge
     Raises
     ------
     MeshFormatError
-        The file cannot be read, or does not hold numbers of this kind.
+        The file cannot be read, or does not hold such numbers.
     """
     try:
         if Path(path).suffix == ".npy":

@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     batch.table.open()
     try:
         _run_jobs(todo, batch)
-    finally:  # also after an interrupt: the table is complete, and the summary counts what is missing
+    finally:  # after an interrupt too: the table is complete, and the summary counts the missing meshes
         batch.table.close()
         summary = _summary(batch, skipped, time.perf_counter() - start)
         write_file(_summary_file(options), (json.dumps(summary, indent=2) + "\n").encode())
@@ -87,18 +87,18 @@ class _Batch(NamedTuple):
     current: dict[str, Row]  # rows of finished jobs, failed ones included, by output name
 
     def fresh(self, job: FileJob) -> Row:
-        """Return the row of a job before its work: names, state of the input, options and version."""
+        """Return the row of a job before it runs: names, state of the input, options and version."""
         row: Row = dict.fromkeys(COLUMNS, "") | {"input": job.input, "output": job.output}
         try:
             found = os.stat(job.input)
             row |= {"input_bytes": found.st_size, "input_mtime_ns": found.st_mtime_ns}
-        except OSError:  # the file has gone; reading it will raise the error
+        except OSError:  # the file is gone; reading it will raise the error
             pass
         return row | {"options": self.recipe, "version": remeshvec.__version__}
 
 
 def _prepared(options: argparse.Namespace) -> _Batch:
-    """Find all files, and refuse what cannot work before any work starts."""
+    """Find all files, and refuse invalid arguments before any work starts."""
     _check_arguments(options)
     table = ResultTable(_table_file(options))
     made = {os.path.realpath(os.path.join(options.out, name)) for name in table.rows}
@@ -136,7 +136,7 @@ def _is_parquet(options: argparse.Namespace) -> bool:
 
 
 def _table_file(options: argparse.Namespace) -> str:
-    """Return the CSV table that rows are appended to; Parquet files cannot be appended to."""
+    """Return the CSV table that rows are appended to; rows cannot be appended to Parquet files."""
     if options.table and not _is_parquet(options):
         return str(options.table)
     return os.path.join(options.out, "results.csv")
@@ -267,6 +267,6 @@ def _print(summary: dict[str, Any], options: argparse.Namespace) -> None:
     print(f"written: {_table_file(options)}, {_summary_file(options)}", flush=True)
     if summary["not_done"]:
         print(
-            f"{summary['not_done']:,} meshes are not done; the same command continues with them",
+            f"{summary['not_done']:,} meshes are not done; run the same command again to continue",
             file=sys.stderr,
         )

@@ -17,7 +17,7 @@ __all__ = ["FileJob", "find_jobs", "refuse_collisions"]
 class FileJob(NamedTuple):
     """One mesh of a batch."""
 
-    input: str  # as it was found
+    input: str  # as found
     output: str  # relative to the folder of results, with slashes; identifies the job
     path: str  # where the output goes
 
@@ -44,7 +44,7 @@ def find_jobs(
     suffix : str, optional
         Suffix of the outputs; by default, outputs keep the suffixes of the inputs.
     made : collection of str
-        Full paths of outputs of earlier runs, which patterns skip.
+        Full paths of outputs of earlier runs; patterns skip them.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def _files(pattern: str, made: Collection[str]) -> list[_Found]:
         return [_Found(pattern, os.path.dirname(pattern))]
     if os.path.isdir(pattern):
         raise OptionError(
-            f"{pattern} is a folder; say '{os.path.join(pattern, '*.obj')}' in quotes"
+            f"{pattern} is a folder; use '{os.path.join(pattern, '*.obj')}' in quotes"
         )
     names = sorted(glob.glob(pattern, recursive=True))
     files = [

@@ -1,10 +1,10 @@
-"""The table of results of a batch, which also tells what is done.
+"""The table of results of a batch, which also records the meshes that are done.
 
 A row is appended in one write when a mesh is done, so a killed run loses at most its last row; an
-incomplete line at the end is dropped. The end of a run sorts the rows, one per mesh.
+incomplete line at the end is dropped. At the end of a run the rows are sorted, one per mesh.
 
-A table that a spreadsheet has saved is read as well: with a byte order mark, other separators, quotes,
-and numbers in other forms. Numbers that were rounded make a mesh look changed: it is done again.
+A table saved by a spreadsheet can be read too: with a byte order mark, other separators, quotes, and
+numbers in other forms. If the spreadsheet rounded a number, the mesh looks changed and is done again.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class ResultTable:
         Raises
         ------
         OptionError
-            The file is not a table of a batch, or holds something else where numbers belong.
+            The file is not a table of a batch, or a number in it is not valid.
         MeshFormatError
             The file cannot be read.
         """
@@ -117,7 +117,7 @@ class ResultTable:
             raise MeshFormatError(f"cannot write {self.path}: no space is left")
 
     def close(self) -> None:
-        """Close the file and write all rows anew, sorted."""
+        """Close the file and write all rows again, sorted."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
@@ -134,12 +134,12 @@ class ResultTable:
 
 
 def _make_numbers_plain(row: Row, line: int) -> None:
-    """Write the numbers of a row as they are written here: ``0.5`` for ``0,5``, ``100`` for ``1E+02``.
+    """Write the numbers of a row in the usual form: ``0.5`` for ``0,5``, ``100`` for ``1E+02``.
 
     Raises
     ------
     ValueError
-        Something else is in the place of a number, such as a date, or one with marks for thousands.
+        An entry is not a number, but for example a date, or a number with thousands separators.
     """
     for name in _NUMBERS:
         entry = row[name].strip().replace(",", ".")
@@ -151,7 +151,9 @@ def _make_numbers_plain(row: Row, line: int) -> None:
                     raise ValueError
                 entry = str(int(float(entry)))
         except (ValueError, OverflowError):
-            raise ValueError(f"{row[name]!r} stands in line {line}, column {name}") from None
+            raise ValueError(
+                f"{row[name]!r} in line {line}, column {name}, is not a number"
+            ) from None
         row[name] = entry
 
 
@@ -163,7 +165,7 @@ def _lines(rows: Iterable[Row]) -> str:
 
 
 def write_parquet(path: str, rows: list[Row]) -> None:
-    """Write rows to a Parquet file, with numbers as numbers and nulls for unknown entries."""
+    """Write rows to a Parquet file, with numbers as numbers and null for missing entries."""
     import pyarrow
     import pyarrow.parquet
 

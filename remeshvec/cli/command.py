@@ -30,7 +30,7 @@ from .array_files import read_array, write_arrays
 __all__ = ["main"]
 
 PATIENCE = 1.0  # seconds of silence before progress is shown
-EXIT_ERROR, EXIT_FAILURE, EXIT_INTERRUPTED = 2, 1, 130  # 130 = 128 + SIGINT, as shells have it
+EXIT_ERROR, EXIT_FAILURE, EXIT_INTERRUPTED = 2, 1, 130  # 130 = 128 + SIGINT, as in shells
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -39,16 +39,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     argv : sequence of str, optional
-        Arguments; those of the process by default.
+        Arguments; by default those of the process.
 
     Returns
     -------
     int
-        Exit status: 0, 2 for bad input, 130 after Ctrl-C, 1 where memory or the terminal failed, 3
-        where some meshes of a batch failed.
+        Exit status: 0 for success, 2 for bad input, 130 after Ctrl-C, 1 if memory or the terminal
+        failed, 3 if some meshes of a batch failed.
     """
     words = sys.argv[1:] if argv is None else list(argv)
-    if words[:1] == ["batch"]:  # a file of this name is ./batch
+    if words[:1] == ["batch"]:  # a file of this name can be given as ./batch
         from . import batch_command as _batch_command
 
         return _ends(_batch_command.run, _batch_command.parsed(words[1:]))
@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _ends(work: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
-    """Do the work and return the exit status; print an error in one line."""
+    """Do the work and return the exit status; errors are printed on one line."""
     try:
         status = work(options)
         sys.stdout.flush()
@@ -80,7 +80,7 @@ def _failed(reason: str, status: int) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Read, remesh, write and show, as the arguments say."""
+    """Read, remesh, write and show, according to the arguments."""
     _check_outputs(options)
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
@@ -172,9 +172,9 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
 
 
 class ProgressLine:
-    """Shows the progress on a stream once the work has lasted longer than `PATIENCE`.
+    """Shows progress on a stream once the work has taken longer than `PATIENCE`.
 
-    On a terminal it rewrites one line; elsewhere, in a log, it prints a line per sweep.
+    On a terminal it rewrites one line; in a log it prints one line per sweep.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -237,7 +237,7 @@ def _save_stats(options: argparse.Namespace, mesh: MeshFile, result: RemeshResul
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that JSON can hold; NaN and infinity become null."""
+    """Return a value that JSON can represent; NaN and infinity become null."""
     if isinstance(value, dict):
         return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

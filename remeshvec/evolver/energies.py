@@ -4,8 +4,8 @@ With N = (x1 - x0) x (x2 - x0), the doubled area vector of a face:
 
 * area ``|N| / 2``;
 * enclosed volume ``x0 . (x1 x x2) / 6``, summed over a closed surface;
-* energy of a fluid of unit density whose potential is the linear function ``u = a . x``: the integral of
-  u over the volume is, by the divergence theorem with the field ``a u^2 / (2 |a|^2)``, the sum of
+* energy of a fluid of unit density in the linear potential ``u = a . x``: by the divergence theorem with
+  the field ``a u^2 / (2 |a|^2)``, the integral of u over the volume is the sum of
   ``(N . a) q / (24 |a|^2)`` with ``q = u0^2 + u1^2 + u2^2 + u0 u1 + u1 u2 + u2 u0``, exact on flat faces
   [Brakke 1992, section 3].
 

@@ -1,4 +1,4 @@
-"""The error of runs of Surface Evolver."""
+"""The error raised by runs of Surface Evolver."""
 
 from __future__ import annotations
 

@@ -35,11 +35,11 @@ FrameCallback = Callable[["Frame"], object]
 # Steps of the flow between two remeshings.
 _FLOW_STEPS = 4
 
-# A length is done after this many sweeps in a row that lower the energy by less than this, relative to
-# it; unless forces grow, as they do for long where a surface is about to break.
+# A length is done after this many consecutive sweeps that lower the energy by less than this relative
+# amount, unless forces grow: they grow for a long time where a surface is about to break.
 _SETTLED, _PATIENCE = 1e-5, 3
 
-# Steps of Newton's method at the end, and how often they may lead so far away that the surface must be
+# Steps of Newton's method at the end, and how often they may move the surface so far that it must be
 # remeshed.
 _NEWTON_STEPS, _RETURNS = 15, 6
 
@@ -52,7 +52,7 @@ class Frame:
     ----------
     V, F : (n, 3) float64, (m, 3) int64
     length : float
-        The edge length that it was remeshed to.
+        Edge length of the last remeshing.
     energy, residual : float
     components : int
     event : str
@@ -70,7 +70,7 @@ class Frame:
 
 @dataclass
 class Evolution:
-    """How an evolution went; unpacks as ``V, F = evolution``.
+    """Result of an evolution; unpacks as ``V, F = evolution``.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ class _Plan:
 
 @dataclass
 class _Log:
-    """Record of all sweeps; shows every frame to the caller, who may cancel."""
+    """Record of all sweeps; passes every frame to the caller, who may cancel."""
 
     keeps_frames: bool
     callback: FrameCallback | None
@@ -228,7 +228,7 @@ class _Log:
             self.is_cancelled = True
 
     def is_about_to_break(self) -> bool:
-        """Tell whether forces grow and the energy falls all the time, if only a little."""
+        """Tell whether forces grow while the energy keeps falling, even if only a little."""
         last = self.history[-1 - _PATIENCE :]
         return last[-1]["residual"] > 1.02 * last[0]["residual"] and all(
             two["energy"] < one["energy"] for one, two in pairwise(last)
@@ -236,7 +236,7 @@ class _Log:
 
 
 class _Run:
-    """State of one evolution: the surface as it is, and the minimum found last."""
+    """State of one evolution: the current surface, and the last minimum."""
 
     def __init__(self, problem: CapillaryProblem, plan: _Plan, log: _Log) -> None:
         self.now = problem.taken_apart() if plan.is_apart else problem
@@ -245,7 +245,7 @@ class _Run:
         self.n_cuts = 0
 
     def is_over(self) -> bool:
-        """Tell whether the caller cancelled, or no face is left."""
+        """Tell whether the caller has cancelled, or no face is left."""
         return self.log.is_cancelled or not len(self.now.F)
 
     def settle(self, L: float) -> None:
@@ -266,9 +266,9 @@ class _Run:
                 return
 
     def finish(self, L: float) -> bool:
-        """Run Newton's method; tells whether it found a minimum, or nothing lower.
+        """Run Newton's method; returns whether it found a minimum, or no lower energy.
 
-        The flow settles at saddles, too; Newton's method leads away from them.
+        The flow settles at saddles too; Newton's method leads away from them.
         """
         if self.is_over():
             return True
@@ -309,14 +309,14 @@ class _Run:
 
 
 def write_frames(folder: str | Path, frames: Sequence[Frame]) -> list[Path]:
-    """Write a sequence of meshes, ``frame_0000.ply`` and so on, that viewers play.
+    """Write a sequence of meshes, ``frame_0000.ply`` and so on, that viewers can play.
 
     Parameters
     ----------
     folder : str or path
-        Made if it is not there.
+        Created if it does not exist.
     frames : sequence of Frame
-        Those of an `Evolution` that kept them.
+        Frames of an `Evolution` with ``frames=True``.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Energy, volumes and their derivatives for a whole problem, at any positions of its vertices.
 
-Nothing is checked here, since the minimisers call these functions for every trial step. The methods of
+These functions check nothing, because the minimisers call them for every trial step. The methods of
 `CapillaryProblem` check their arguments.
 """
 

@@ -59,7 +59,7 @@ _FIRST_SHIFT, _SHIFT_FACTOR, _SHIFTS = 1e-3, 8.0, 14
 
 @dataclass
 class Minimum:
-    """Where a minimisation ended.
+    """Result of a minimisation.
 
     Attributes
     ----------
@@ -69,14 +69,14 @@ class Minimum:
         Offsets included.
     pressure : (g,) float64
         Pressure per body: the Lagrange multiplier of its volume, which is the derivative of the least
-        energy by that volume.
+        energy with respect to that volume.
     residual : float
         Root mean square of the normal force density (energy gradient minus pressure) on free vertices,
-        times the square root of the area, over the tension. It has no unit.
+        times the square root of the area, over the tension; dimensionless.
     converged : bool
-        The residual is below the tolerance.
+        Whether the residual is below the tolerance.
     stop : str
-        Why it ended.
+        Reason for the end.
     history : list of dict
         "energy" and "residual" after every step.
     """
@@ -110,7 +110,7 @@ def minimize(
     steps: int | None = None,
     callback: StepCallback | None = None,
 ) -> Minimum:
-    """Move the free vertices to the least energy, on the given triangles.
+    """Move the free vertices to the least energy; the triangles stay the same.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def _descend(
     tolerance: float,
     callback: StepCallback | None,
 ) -> Minimum:
-    """Take steps until one of the reasons to stop holds."""
+    """Take steps until there is a reason to stop."""
     history: list[dict[str, float]] = []
     pressure, residual = _balance(now, now.forces())
     stop = "all steps done"
@@ -183,13 +183,13 @@ def _descend(
 
 
 def measured(problem: CapillaryProblem, tolerance: float, stop: str) -> Minimum:
-    """Describe a surface as it is, with its pressures and its residual."""
+    """Return the result for a surface as it is, with its pressures and its residual."""
     pressure, residual = _balance(problem, problem.forces())
     return _minimum(problem, pressure, residual, tolerance, stop, [])
 
 
 def unmoved(problem: CapillaryProblem, stop: str) -> Minimum:
-    """Describe a surface that cannot move: no vertex is free, or no face is left."""
+    """Return the result for a surface that cannot move: no vertex is free, or no face is left."""
     return _minimum(problem, np.zeros(len(problem.targets)), 0.0, 0.0, stop, [])
 
 
@@ -334,7 +334,7 @@ def _newton_step(
         return None
     step = np.zeros_like(problem.V)
     step[free] = u[:, None] * normal[free]
-    # Near the minimum, energies differ by rounding only; there the step is right without a search.
+    # Near the minimum, energies differ only by rounding; there the full step is taken without a search.
     small = np.abs(u).max() < 1e-5 * np.sqrt(area.sum())
     return _searched(problem, step, forces.volume, 1e-13 if small else 0.0)
 

@@ -23,8 +23,8 @@ __all__ = ["Cut", "cut_necks"]
 
 Cycle = tuple[int, ...]
 
-# A piece hangs on a neck if its area is at least this many times that of the cap. Less is the base of a
-# cone, or a vertex with three faces.
+# A piece hangs on a neck if its area is at least this many times that of the cap. A smaller piece is the
+# base of a cone, or a vertex with three faces.
 _SHORTEST_PIECE = 8.0
 
 
@@ -52,7 +52,7 @@ def cut_necks(V: ArrayLike, F: ArrayLike, held: ArrayLike, perimeter: float = 0.
     ----------
     V : (n, 3) float
     F : (m, 3) int
-        A manifold with faces of one winding.
+        A manifold with consistently oriented faces.
     held : (k,) int or (n,) bool
         Vertices that no cut may go through.
     perimeter : float
@@ -76,7 +76,7 @@ def cut_necks(V: ArrayLike, F: ArrayLike, held: ArrayLike, perimeter: float = 0.
     longest = number(perimeter, "perimeter", low=0.0, unit="units of V")
     source = np.arange(len(vertices))
     count = 0
-    # One at a time: cuts may share edges, and each changes the cycles of the others. There are few.
+    # One at a time: cuts may share edges, and each changes the cycles of the others. Cuts are rare.
     while (cycle := _next_cycle(vertices, faces, is_held[source], longest)) is not None:
         vertices, faces, source = _split(vertices, faces, source, cycle)
         count += 1

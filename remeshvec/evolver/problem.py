@@ -1,4 +1,4 @@
-"""The problem: a surface under tension, the volume that it encloses, and the wires that hold it."""
+"""The capillary problem: a surface under tension, its enclosed volume, and the wires that hold it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class CapillaryProblem:
     V : (n, 3) float
         Vertices, in any unit of length.
     F : (m, 3) int
-        Faces, of one winding; the volume is positive where they run counterclockwise from outside.
+        Faces, consistently oriented; the volume is positive if they run counterclockwise from outside.
     fixed : (k,) int or (n,) bool, optional
         Vertices that never move, besides the ends of fixed edges.
     fixed_edges : (k, 2) int, optional
@@ -197,7 +197,7 @@ class CapillaryProblem:
 
 
 def as_problem(value: object) -> CapillaryProblem:
-    """Check that something is a problem."""
+    """Check that a value is a problem."""
     problem: CapillaryProblem = instance(value, "problem", CapillaryProblem, "a CapillaryProblem")
     return problem
 
@@ -212,7 +212,7 @@ def with_surface(
     body: IntArray | None = None,
     targets: FloatArray | None = None,
 ) -> CapillaryProblem:
-    """Return the problem with another surface; arguments that are left out stay. Nothing is checked."""
+    """Return the problem with another surface, unchecked; arguments that are left out stay the same."""
     other = copy(problem)
     other.V = V
     other.F = problem.F if F is None else F
@@ -230,7 +230,7 @@ def _apart(problem: CapillaryProblem) -> tuple[IntArray, FloatArray]:
     count, body = problem.components()
     T = problem.V[problem.F]
     now = np.bincount(body, volumes(T), count)
-    # The difference between prescribed and present volume is distributed by area.
+    # The difference between prescribed and current volume is distributed by area.
     missing = problem.targets.sum() - now.sum()
     share = np.bincount(body, areas(T), count)
     return body, now + missing * share / share.sum()
@@ -252,7 +252,7 @@ def _wires(
 
 
 def _check_winding(F: IntArray) -> None:
-    """Refuse faces that run along an edge in the same direction: then there is no inside."""
+    """Refuse faces that run along an edge in the same direction, because then there is no inside."""
     start, end = halfedge_ends(F)
     key = start * (F.max() + 1) + end
     _, index, count = np.unique(key, return_index=True, return_counts=True)

@@ -52,7 +52,7 @@ def remeshed(
 
 
 def _graded(problem: CapillaryProblem, L: float) -> float | FloatArray:
-    """Target lengths: L, but at wires the length of their edges, so that no wire must be split."""
+    """Target lengths: L, but at wires the lengths of their edges, so that wires need not be split."""
     edges = problem.fixed_edges
     if not len(edges):
         return L

@@ -28,7 +28,7 @@ from .problem import CapillaryProblem, as_problem, with_surface
 
 __all__ = ["EvolverBackend", "read_dump", "write_fe"]
 
-# Steps, unless the caller gives a number.
+# Default number of steps.
 _EVOLVER_STEPS = {"flow": 10, "newton": 8}
 
 # Gradient steps before Newton steps are tried, and gradient steps per step of the flow.
@@ -58,7 +58,7 @@ def write_fe(path: str | Path, problem: CapillaryProblem) -> Path:
     MeshFormatError
         The file cannot be written.
     OptionError
-        Gravity has a component across the z axis, which Surface Evolver does not have.
+        Gravity is not along the z axis, as Surface Evolver requires.
     """
     as_problem(problem)
     file = Path(as_path(path, "path"))
@@ -87,7 +87,7 @@ def _bodies(problem: CapillaryProblem) -> list[str]:
     lines = ["bodies"]
     for g in range(max(1, len(problem.targets))):
         faces = " ".join(str(f + 1) for f in np.flatnonzero(problem.body == g))
-        # The offset belongs to the only body. Of several bodies, it is not known which has it.
+        # The offset belongs to the only body. With several bodies, it is unknown which one has it.
         offset = problem.volume_offset if len(problem.targets) < 2 else 0.0
         volume = f" volume {float(problem.targets[g]) + offset!r}" if len(problem.targets) else ""
         density = f" density {problem.density!r}" if problem.density else ""
@@ -170,18 +170,18 @@ def _is_plain_number(words: list[str]) -> bool:
 
 
 class EvolverBackend:
-    """Minimise with Surface Evolver; serves `evolve` in place of the native solver.
+    """Minimise with Surface Evolver; replaces the native solver in `evolve`.
 
     Called like `minimize`. "flow" is its gradient descent with an optimising scale (``g``). "newton" is
     its ``hessian`` after a step of scale 0, which restores volumes. Where the energy rises or Newton
-    steps fail, gradient steps come first, or take their place.
+    steps fail, gradient steps come before them or replace them.
 
     Parameters
     ----------
     executable : str
         Name or path of the program; Debian's package is ``evolver-nox``.
     timeout : float
-        The most seconds per run.
+        Time limit per run, in seconds.
 
     Raises
     ------
@@ -222,7 +222,7 @@ class EvolverBackend:
         return result
 
     def _lowered(self, problem: CapillaryProblem, scripts: list[str]) -> CapillaryProblem:
-        """Run scripts until one does not raise the energy; the result of the last one always counts."""
+        """Run scripts until one does not raise the energy; the result of the last one is always taken."""
         before = with_restored_volumes(problem).energy()
         for script in scripts[:-1]:
             try:

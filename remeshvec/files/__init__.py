@@ -1,1 +1,1 @@
-"""Mesh files: guarded, read, and written whole or not at all."""
+"""Mesh files: checked before they are read, and written completely or not at all."""

@@ -1,6 +1,6 @@
 """Reading and writing meshes with their data: texture coordinates, colours, fields, groups.
 
-The package reads and writes OBJ and PLY files with data by itself; OFF, STL and JSON hold a mesh alone.
+The package reads and writes OBJ and PLY files with data by itself; OFF, STL and JSON hold only a mesh.
 All other formats are left to meshio, pyvista and trimesh.
 """
 
@@ -35,17 +35,17 @@ __all__ = [
     "write_data",
 ]
 
-# Suffixes that patterns look for; files with others are read if they are named.
+# Suffixes that patterns match; files with other suffixes are read if they are named.
 COMMON_SUFFIXES = (*SUFFIXES, ".vtk", ".vtu", ".vtp", ".msh", ".xdmf", ".glb", ".gltf")
 
 
 def read_data(path: FilePath) -> tuple[MeshData, list[str]]:
-    """Read a mesh with its data, and notices of what the reader did.
+    """Read a mesh with its data; returns also notices of what the reader changed.
 
     Raises
     ------
     MeshFormatError
-        The file cannot be read as what its suffix says, or holds no valid mesh.
+        The file is not in the format of its suffix, or does not hold a valid mesh.
     OptionError
         ``path`` is not a path.
     """
@@ -66,19 +66,19 @@ def read_data(path: FilePath) -> tuple[MeshData, list[str]]:
 
 
 def _read_own(file: ObjFile | PlyFile, path: Path) -> tuple[MeshData, list[str]]:
-    """Read a mesh with its data; the mesh alone, with a notice, if only that is valid."""
+    """Read a mesh with its data; only the mesh, with a notice, if the data are not valid."""
     mesh = file.mesh()
     check_polygons(mesh)
     triangles = triangulated(mesh)
     try:
         return file.data(mesh.V, triangles, path.parent), triangles.notices
     except ValueError as error:
-        notice = f"only the mesh was read, not what it carries: {reason(error)}"
+        notice = f"only the mesh was read, without its data: {reason(error)}"
         return MeshData(mesh.V, triangles.F), [*triangles.notices, notice]
 
 
 def check_data_writable(path: FilePath, suffixes: Sequence[str] = ()) -> None:
-    """Refuse a path that `write_data` could not write, before long work is done for it.
+    """Refuse a path that `write_data` cannot write, before long work starts.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def write_data(path: FilePath, data: MeshData) -> list[str]:
     MeshFormatError
         The file cannot be written; an existing file of that name stays as it is.
     OptionError
-        ``path`` is not a path, or ``data`` are not `MeshData`.
+        ``path`` is not a path, or ``data`` is not a `MeshData`.
     """
     path = Path(arguments.path(path, "path"))
     arguments.instance(data, "data", MeshData, "a MeshData")

@@ -1,4 +1,4 @@
-"""Whole files: checked before they are read, written completely or not at all."""
+"""Files as a whole: checked before they are read, written completely or not at all."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def named_errors(action: str, path: Path) -> Iterator[None]:
     """
     try:
         yield
-    except Exception as error:  # libraries raise all sorts on a broken file
+    except Exception as error:  # on a broken file, libraries raise errors of any type
         raise MeshFormatError(f"cannot {action} {path}: {reason(error)}") from error
 
 
 def reason(error: Exception) -> str:
-    """Say in one line what went wrong."""
+    """Describe an error in one line."""
     if isinstance(error, MemoryError):
         return "there is not enough memory"
     if isinstance(error, json.JSONDecodeError):
@@ -76,13 +76,13 @@ def check_regular(path: Path) -> None:
 
 
 def checked_bytes(path: Path) -> bytes:
-    """Return the content of a regular file of bearable size whose format fits its suffix.
+    """Return the content of a regular file, not too large, whose format matches its suffix.
 
     Raises
     ------
     ValueError
-        The file is missing, empty, not regular, too large, compressed, or of another format than its
-        suffix says.
+        The file is missing, empty, not regular, too large, compressed, or not in the format of its
+        suffix.
     """
     check_regular(path)
     size = path.stat().st_size
@@ -96,7 +96,7 @@ def checked_bytes(path: Path) -> bytes:
 
 
 def _check_suffix(data: bytes, suffix: str) -> None:
-    """Refuse content that is plainly of another format than the suffix says."""
+    """Refuse content that is clearly in another format than that of the suffix."""
     if data[:2] == b"\x1f\x8b" or data[:4] == b"PK\x03\x04":
         raise ValueError("it is compressed; unpack it first")
     found = _format_of(data)
@@ -107,7 +107,7 @@ def _check_suffix(data: bytes, suffix: str) -> None:
 
 
 def _format_of(data: bytes) -> str | None:
-    """Return the suffix of a format that names itself in its first bytes."""
+    """Return the suffix of a format that is recognised by its first bytes."""
     head = data[:512].removeprefix(b"\xef\xbb\xbf").lstrip()
     if re.match(rb"ply[ \t]*\r?\n", head):
         return ".ply"
@@ -119,9 +119,9 @@ def _format_of(data: bytes) -> str | None:
 
 
 def write_file(path: FilePath, content: bytes) -> None:
-    """Write a file under another name beside it, then rename: nobody sees a half-written file.
+    """Write a temporary file beside the target, then rename it: nobody sees a half-written file.
 
-    The content is on the disk before the name, so this holds after a loss of power too.
+    The content reaches the disk before the name, so this holds even after a loss of power.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def write_file(path: FilePath, content: bytes) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Bring a new name to the disk, where the system lets folders be opened."""
+    """Flush a new name to the disk, if the system allows folders to be opened."""
     with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -156,20 +156,20 @@ def _sync_folder(folder: Path) -> None:
 
 
 def check_writable(path: FilePath, suffixes: Sequence[str] = ()) -> None:
-    """Refuse a path that cannot be written, before long work is done for it.
+    """Refuse a path that cannot be written, before long work starts.
 
     Parameters
     ----------
     path : str or path
-        The file to be.
+        The file to write.
     suffixes : sequence of str
         Allowed suffixes, in lower case; empty for any.
 
     Raises
     ------
     MeshFormatError
-        The suffix is not allowed, the folder does not exist or cannot be written to, or a folder has
-        this name.
+        The suffix is not allowed, the parent folder does not exist or is not writable, or the path is
+        a folder.
     """
     with named_errors("write", Path(arguments.path(path, "path"))):
         obstacle = _obstacle(Path(path).resolve(), suffixes)
@@ -179,7 +179,7 @@ def check_writable(path: FilePath, suffixes: Sequence[str] = ()) -> None:
 
 def _obstacle(target: Path, suffixes: Sequence[str]) -> str | None:
     if suffixes and target.suffix.lower() not in suffixes:
-        return f"the suffix {target.suffix!r} is none of {', '.join(suffixes)}"
+        return f"the suffix {target.suffix!r} is not one of {', '.join(suffixes)}"
     if not target.parent.is_dir():
         return f"there is no folder {target.parent}"
     if target.is_dir():
@@ -187,5 +187,5 @@ def _obstacle(target: Path, suffixes: Sequence[str]) -> str | None:
     if target.exists() and not target.is_file():
         return "it is not a regular file"
     if not os.access(target.parent, os.W_OK | os.X_OK):
-        return f"the folder {target.parent} cannot be written to"
+        return f"the folder {target.parent} is not writable"
     return None

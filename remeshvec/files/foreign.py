@@ -18,19 +18,19 @@ from ..processes.pool import StandingWorker
 __all__ = ["can_write", "read_foreign", "write_foreign"]
 
 _OWN = ".obj, .off, .ply, .stl, .json"
-# meshio reads these too, but as a drawing, as a table, or only together with a second file.
+# meshio reads these too, but as a drawing or a table, or only together with a second file.
 _NOT_MESHIO = (".svg", ".xml", ".dat", ".post", ".post.gz", ".ele", ".node")
 _PYVISTA = (".vtp",)
 _TRIMESH = (".glb", ".gltf", ".3mf", ".dae")
 _READ_ONLY = (".3mf", ".dae")  # trimesh writes them without the data
 
-# Formats of meshio that hold any data on points and cells; numbers of components that they can hold.
+# Formats of meshio that hold any data on points and cells, with the numbers of components allowed.
 _WITH_DATA = ("vtk", "vtu", "xdmf", "gmsh22")
 _COLUMNS: dict[str | None, tuple[int, ...]] = {"xdmf": (1, 3, 6, 9), "gmsh22": (1, 3, 9)}
 
 _SCENE = "scene:geometry"
 
-# Some readers never come to the end of a damaged file. The slowest read 1 MB of text in a second.
+# Some readers never finish a damaged file. The slowest reads 1 MB of text per second.
 _SECONDS, _BYTES_PER_SECOND = 60.0, 200_000
 
 
@@ -47,7 +47,7 @@ def _library(suffix: str) -> tuple[str, Any]:
         library = importlib.import_module(name)
     except ImportError:
         raise ValueError(
-            f"the suffix {suffix!r} is none of {_OWN}; {name}, which may know it, is not installed "
+            f"the suffix {suffix!r} is not one of {_OWN}; {name}, which may read it, is not installed "
             f"(pip install {name})"
         ) from None
     known = name != "meshio" or (
@@ -55,20 +55,20 @@ def _library(suffix: str) -> tuple[str, Any]:
     )
     if not known:
         raise ValueError(
-            f"the suffix {suffix!r} is none of {_OWN}, {', '.join(_PYVISTA + _TRIMESH)}, "
-            "and none that meshio knows"
+            f"the suffix {suffix!r} is not one of {_OWN}, {', '.join(_PYVISTA + _TRIMESH)}, "
+            "and meshio does not know it"
         )
     return name, library
 
 
 def can_write(suffix: str) -> str | None:
-    """Return why a file with this suffix cannot be written, None if it can."""
+    """Return the reason why a file with this suffix cannot be written; None if it can."""
     try:
         name, library = _library(suffix)
     except ValueError as error:
         return str(error)
     if suffix in _READ_ONLY or (name == "meshio" and _writer(library, suffix) is None):
-        return f"files {suffix} can be read only"
+        return f"{suffix} files can be read only"
     return None
 
 
@@ -84,10 +84,10 @@ def _writer(meshio: Any, suffix: str) -> str | None:
 def read_foreign(path: Path) -> tuple[MeshData, list[str]]:
     """Read a file with the library that knows it; returns also notices of data left out.
 
-    The library works in a process of its own, with a limit of a minute and of what the file's size
-    justifies: on damaged files meshio may read for ever, and VTK ends its process if a file asks for
-    more memory than there is. The first file waits for the process and the import, about a second;
-    the process then stays for the next file.
+    The library runs in a separate process, with a time limit of a minute plus a share for the size of
+    the file: on damaged files meshio may read for ever, and VTK ends its process if a file asks for
+    more memory than there is. The first file waits about a second for the process and the import; the
+    process then stays for the next file.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def _read_meshio(meshio: Any, path: Path) -> Any:
     for kind in meshio.extension_to_filetypes[path.suffix.lower()]:
         try:
             return meshio._helpers.reader_map[kind](str(path))
-        except Exception as error:  # readers raise all sorts on a broken file
+        except Exception as error:  # on a broken file, readers raise errors of any type
             problem = error
     raise problem
 
@@ -194,7 +194,7 @@ def write_foreign(path: Path, data: MeshData) -> tuple[bytes, set[str]]:
 
 
 def _fit(data: MeshData, kind: str | None) -> set[str]:
-    """Reshape data for a format of meshio, and drop other data; returns the names of those dropped."""
+    """Reshape data for a format of meshio, and drop data that it cannot hold; returns their names."""
     lost = set()
     for table in (data.on_vertices, data.on_faces):
         for name, values in list(table.items()):
@@ -203,7 +203,7 @@ def _fit(data: MeshData, kind: str | None) -> set[str]:
                 flat = np.column_stack([flat, np.zeros(len(flat), flat.dtype)])
             columns = 1 if flat.ndim == 1 else flat.shape[1]
             small = flat.dtype.kind in "iub" and flat.dtype.itemsize < 4
-            table[name] = flat.astype(np.int32) if small else flat  # XDMF has no shorter ones
+            table[name] = flat.astype(np.int32) if small else flat  # XDMF has no smaller integers
             if flat.dtype.kind not in "fiub" or columns not in _COLUMNS.get(kind, (columns,)):
                 lost.add(name)
                 del table[name]
@@ -232,7 +232,7 @@ _PLAIN = {UV: "uv", COLOUR: "color"}
 
 
 def _plain_names(data: MeshData) -> MeshData:
-    """Replace names that stand for a scene or its visuals by those that files use."""
+    """Replace names that stand for a scene or its visuals by the names that files use."""
     vertices = {_PLAIN.get(name, name): x for name, x in data.on_vertices.items()}
     faces = {_PLAIN.get(name, name): x for name, x in data.on_faces.items() if name != _SCENE}
     return MeshData(data.V, data.F, vertices, faces, extra=data.extra)

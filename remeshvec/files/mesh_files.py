@@ -1,7 +1,7 @@
 """Reading and writing meshes: OBJ, OFF, PLY, STL and JSON.
 
-Each format has one writer and one parser, which refuses anything it does not understand. All failures
-are a `MeshFormatError` that names the file and the reason.
+Each format has one writer and one parser, which refuses anything it does not understand. Every failure
+is a `MeshFormatError` that names the file and the reason.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class MeshFile(NamedTuple):
     F : (m, 3) int64
         Faces, 0-based.
     notices : list of str
-        What the reader did beyond reading: polygons cut into triangles, corners welded.
+        Changes that the reader made: polygons cut into triangles, corners welded.
     """
 
     V: FloatArray
@@ -50,13 +50,13 @@ def read_mesh(path: FilePath) -> MeshFile:
 
     Polygons are cut into fans from their first corner, which suits convex ones. Texture
     coordinates, normals and colours are ignored and never split a vertex. The triangles of an STL
-    file, which shares no vertices, are joined where corners are exactly equal. JSON is
+    file, which do not share vertices, are joined where corners are exactly equal. JSON is
     ``{"verts": [[x, y, z], ...], "faces": [[i, j, k], ...]}``, 0-based.
 
     Parameters
     ----------
     path : str or path
-        The file; its suffix gives the format, in capitals or not.
+        The file; its suffix gives the format, in upper or lower case.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def read_mesh(path: FilePath) -> MeshFile:
     Raises
     ------
     MeshFormatError
-        The file cannot be read as what its suffix says, or holds no valid mesh.
+        The file is not in the format of its suffix, or does not hold a valid mesh.
     OptionError
         ``path`` is not a path.
     """
@@ -110,7 +110,7 @@ def write_mesh(path: FilePath, V: ArrayLike, F: ArrayLike) -> None:
 def _known_suffix(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise ValueError(f"the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}")
+        raise ValueError(f"the suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}")
     return suffix
 
 

@@ -1,7 +1,7 @@
 """OBJ files: vertices and faces; on request texture coordinates, colours, groups and materials.
 
-One parser serves both. It sorts statements by keyword and remembers their positions in the file, which
-decide what a negative index counts from and which group a face is in.
+One parser serves both. It sorts statements by keyword and remembers their positions in the file, because
+negative indices and groups depend on them.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from .text import floats, integers, number_table, points, shown, text_lines, wor
 __all__ = ["OBJ_DATA", "ObjFile", "obj_bytes"]
 
 
-# Statements that name parts of a mesh, and the names of these data here.
+# Statements that name parts of a mesh, and what their data are called here.
 _PARTS = {"o": "object", "g": "group", "usemtl": "material"}
 OBJ_DATA = frozenset({"uv", "color", *_PARTS.values()})
 
-# All keywords of the format, also of curves, free-form surfaces and rendering, which are left out.
+# All keywords of the format; those of curves, free-form surfaces and rendering are left out.
 _KEYWORD = re.compile(
     "v[tnp]?|[flposg]|mg|usemtl|mtllib|usemap|maplib|lod|bevel|[cd]_interp|(shadow|trace)_obj|"
     "deg|bmat|step|cstype|curv2?|surf|parm|trim|hole|scrv|sp|end|con|[cs]tech"
@@ -53,8 +53,8 @@ class ObjFile:
     Raises
     ------
     ValueError
-        A vertex has fewer than three finite numbers, a face fewer than three indices, or a face
-        has something else among them.
+        A vertex has fewer than three finite numbers, a face has fewer than three indices, or a face
+        holds something else.
     """
 
     def __init__(self, content: bytes) -> None:
@@ -67,15 +67,15 @@ class ObjFile:
         self._faces = _parse_faces(self._operands("f"))
 
     def _at(self, keyword: str) -> IntArray:
-        """Return where the statements with a keyword stand among all statements."""
+        """Return the positions of the statements with a keyword among all statements."""
         return self._places.get(keyword, np.empty(0, np.int64))
 
     def _operands(self, keyword: str) -> list[bytes]:
-        """Return the statements with a keyword, without it."""
+        """Return the statements with a keyword, without the keyword."""
         return [self._lines[i][len(keyword) :] for i in self._at(keyword).tolist()]
 
     def _zero_based(self, indices: IntArray, keyword: str) -> IntArray:
-        """Turn indices of corners, which count from 1 or back from the face, into 0-based ones."""
+        """Turn indices of corners, which count from 1 or backwards from the face, into 0-based ones."""
         if (indices > 0).all():
             return indices - 1
         known = np.searchsorted(self._at(keyword), self._at("f"))  # statements before each face
@@ -90,7 +90,7 @@ class ObjFile:
         )
 
     def _notices(self) -> list[str]:
-        """Say which lines were left out because of their keyword: a face may hide in one of them."""
+        """Report lines that were left out for an unknown keyword: one of them may be a face."""
         unknown = [at for keyword, at in self._places.items() if not _KEYWORD.fullmatch(keyword)]
         if not unknown:
             return []
@@ -109,7 +109,7 @@ class ObjFile:
         triangles : Triangles
             The polygons, cut.
         folder : Path
-            Names of material libraries are relative to it.
+            Folder that names of material libraries are relative to.
 
         Raises
         ------
@@ -152,7 +152,7 @@ class ObjFile:
         names = [_decoded(operand) for operand in self._operands(keyword)]
         number = {name: i for i, name in enumerate(dict.fromkeys(names))}
         label = np.array([*(number[name] for name in names), -1])
-        latest = np.searchsorted(self._at(keyword), self._at("f")) - 1  # -1, the last, for none
+        latest = np.searchsorted(self._at(keyword), self._at("f")) - 1  # -1, the last, if none
         return list(number), label[latest]
 
 
@@ -173,7 +173,7 @@ def _parse_textures(lines: Sequence[bytes]) -> FloatArray:
 
 
 def _parse_faces(lines: Sequence[bytes]) -> _FaceIndices:
-    """Read faces, whose corners are of the form v, v/t, v/t/n or v//n."""
+    """Read faces whose corners have the form v, v/t, v/t/n or v//n."""
     text = b"\n".join(lines)
     sizes = word_counts(text) if lines else np.empty(0, np.int64)
     has_textures = b"/" in text and b"//" not in text
@@ -195,7 +195,7 @@ def _parse_faces(lines: Sequence[bytes]) -> _FaceIndices:
 
 
 def _parse_mixed_faces(lines: Sequence[bytes]) -> _FaceIndices:
-    """Read faces word by word: their corners differ in form, or one of them is wrong."""
+    """Read faces word by word, if their corners differ in form or one of them is wrong."""
     vertices, textures, sizes = [], [], []
     for line in lines:
         corners = [_CORNER.fullmatch(word) for word in line.split()]
@@ -214,7 +214,7 @@ def _parse_mixed_faces(lines: Sequence[bytes]) -> _FaceIndices:
 
 
 def obj_bytes(data: MeshData, path: Path) -> bytes:
-    """Write a mesh with all that OBJ can hold; every coordinate keeps all its bits."""
+    """Write a mesh with all data that OBJ can hold; every coordinate keeps all its bits."""
     colours = data.on_vertices.get("color")
     if colours is not None and colours.dtype.kind == "u":
         colours = colours / np.iinfo(colours.dtype).max
@@ -235,7 +235,7 @@ def obj_bytes(data: MeshData, path: Path) -> bytes:
 
 
 def _statements(keyword: str, table: NDArray[Any]) -> list[str]:
-    """Return a statement per row."""
+    """Return one statement per row."""
     pattern = " ".join([keyword, *["{!r}"] * table.shape[1]])
     return [pattern.format(*row) for row in table.tolist()]
 
@@ -255,7 +255,7 @@ def _add_parts(faces: list[str], data: MeshData) -> None:
 
 
 def _in_line(name: str) -> str:
-    """Return a name that ends where its line ends, so that the next statement is read."""
+    """Return a name on one line, so that the next statement is still read."""
     return _NOT_IN_NAMES.sub(" ", name).rstrip("\\ \t")
 
 

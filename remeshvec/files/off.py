@@ -1,4 +1,4 @@
-"""OFF files, also COFF, NOFF and STOFF: points and faces, without their colours and normals."""
+"""OFF files, including COFF, NOFF and STOFF: points and faces; colours and normals are ignored."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ _COUNT = re.compile(rb"\d{1,9}")
 
 
 def parse_off(data: bytes) -> PolygonMesh:
-    """Read a text in which every vertex and every face has a line of its own.
+    """Read a text with one line per vertex and one per face.
 
     Raises
     ------
     ValueError
-        The header cannot be understood or does not fit the number of lines, or a line is wrong.
+        The header is not valid or does not match the number of lines, or a line is wrong.
     """
     lines = text_lines(data)
     keyword, *counts = lines[0].split() if lines else [b""]
     if not _KEYWORD.fullmatch(keyword):
-        raise ValueError(f"it does not start with OFF, COFF or NOFF but with {shown(keyword)}")
+        raise ValueError(f"it starts with {shown(keyword)}, not with OFF, COFF or NOFF")
     if counts[:1] == [b"BINARY"]:
         raise ValueError("binary OFF is not supported")
     body = lines[1:] if counts else lines[2:]

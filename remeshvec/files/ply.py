@@ -17,7 +17,7 @@ from .text import floats, shown
 
 __all__ = ["PlyFile", "ply_bytes"]
 
-# Names of vectors here, and of their components in PLY files.
+# Names of vectors, and of their components in PLY files.
 _VECTORS: dict[str, list[tuple[str, ...]]] = {
     "color": [("red", "green", "blue", "alpha"), ("red", "green", "blue")],
     "normal": [("nx", "ny", "nz")],
@@ -33,8 +33,8 @@ class PlyFile:
     Raises
     ------
     ValueError
-        The header cannot be understood, lacks vertices or faces, or promises more than the file
-        holds; or a row does not fit the header.
+        The header is not valid, lacks vertices or faces, or promises more than the file holds; or a row
+        does not match the header.
     """
 
     def __init__(self, content: bytes) -> None:
@@ -85,7 +85,7 @@ class PlyFile:
         return data
 
     def _columns(self, element: str, table: PlyTable) -> Data:
-        """Return the columns of a table besides coordinates, in the types of the header."""
+        """Return the columns of a table except coordinates, in the types of the header."""
         return {
             p.name: _cast(_as_numbers(table.scalars[p.name], p.name), p.dtype, p.name)
             for p in self._header.element(element).properties
@@ -123,7 +123,7 @@ def _cast(values: NDArray[Any], dtype: Any, name: str) -> NDArray[Any]:
     with np.errstate(invalid="ignore", over="ignore"):  # some NaN warn when they are cast
         cast = values.astype(kind, copy=False)
     if kind.kind in "iu" and not np.array_equal(cast, values):
-        raise ValueError(f"the column {name!r} holds something else than integers of its type")
+        raise ValueError(f"the column {name!r} holds values that are not integers of its type")
     return cast
 
 
@@ -140,7 +140,7 @@ def _join_vectors(columns: Data, into: Data, extra: dict[str, Any]) -> None:
 
 
 def ply_bytes(data: MeshData) -> bytes:
-    """Write a mesh with all data on vertices and faces, and texture coordinates on corners, binary."""
+    """Write a binary file: a mesh, all data on vertices and faces, texture coordinates on corners."""
     vertex = {axis: data.V[:, i] for i, axis in enumerate("xyz")}
     vertex |= _scalars(data.on_vertices, data.extra)
     lists = {"vertex_indices": data.F.astype(np.int32)}
@@ -165,7 +165,7 @@ def _written(name: str, scalars: Data, lists: Data, count: int) -> tuple[list[st
         fields += [(f"length of {column}", "u1"), (column, kind, values.shape[1:])]
     for column, values in scalars.items():
         if len(column.split()) != 1:
-            raise ValueError(f"PLY holds no column named {column!r}: a blank ends the name")
+            raise ValueError(f"PLY cannot hold a column named {column!r}: a blank ends the name")
         head.append(f"property {TYPE_NAMES[values.dtype.str[1:]]} {column}")
         fields.append((column, values.dtype.newbyteorder("<")))
     rows = np.empty(count, fields)
@@ -205,5 +205,5 @@ def _storable(values: NDArray[Any], name: str) -> NDArray[Any]:
         low, high = (values.min(), values.max()) if values.size else (0, 0)
         return values.astype(np.float64 if low < -(2**31) or high >= 2**31 else np.int32)
     if values.dtype.str[1:] not in TYPE_NAMES:
-        raise ValueError(f"PLY holds no values of type {values.dtype}, as {name!r} has")
+        raise ValueError(f"PLY cannot hold values of type {values.dtype}, as {name!r} has")
     return values

@@ -58,11 +58,11 @@ class PlyHeader(NamedTuple):
     start: int
 
     def element(self, name: str) -> Element:
-        """Return the table of this name, which must be there."""
+        """Return the table of this name, which must exist."""
         for element in self.elements:
             if element.name == name:
                 return element
-        raise ValueError(f"the header names no element {name!r}")
+        raise ValueError(f"the header does not name an element {name!r}")
 
 
 def parse_header(data: bytes) -> PlyHeader:
@@ -71,13 +71,13 @@ def parse_header(data: bytes) -> PlyHeader:
     Raises
     ------
     ValueError
-        A line cannot be understood, or the end is missing.
+        A line is not valid, or the end is missing.
     """
     end = re.search(rb"^end_header[ \t]*\r?\n", data[:_MAX_BYTES], re.MULTILINE)
     if end is None:
         raise ValueError("the header has no end: the file is cut short, or not PLY")
     form, elements, comments = "", [], []
-    for row in data[: end.start()].splitlines()[1:]:  # as bytes: text has more ends of lines
+    for row in data[: end.start()].splitlines()[1:]:  # as bytes: text has more line endings
         line = row.decode("utf-8", "replace")
         match line.split():
             case ["comment", *_]:

@@ -1,7 +1,7 @@
 """The tables of PLY files, as text and binary.
 
-A table is read as one array if the lists in every row are as long as those in the first row.
-Otherwise it is walked row by row.
+A table is read as one array if the lists of all rows are as long as those of the first row.
+Otherwise it is read row by row.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from .text import check_room, number_table, shown, text_lines
 
 __all__ = ["PlyTable", "read_tables"]
 
-_LONGEST_LIST = 1 << 20  # in the first row; a longer one is rather a misread length
+_LONGEST_LIST = 1 << 20  # in the first row; a longer one is probably a misread length
 
-# For each column its values, one row after the other, with their number per row; where the table ends.
+# The values of each column, row after row, with their number per row; and where the table ends.
 _Columns = tuple[list[tuple[Any, IntArray]], int]
 
 
 class PlyTable(NamedTuple):
-    """Columns by name. Values are arrays, or lists of words where not all words of a text are numbers.
+    """Columns by name. Values are arrays, or lists of words if not all words of a text are numbers.
 
     Parameters
     ----------
     scalars : dict
         One value per row.
     lists : dict of pairs
-        The values of all rows, one row after the other, and their number per row.
+        The values of all rows, row after row, and their number per row.
     """
 
     scalars: dict[str, Any]
@@ -46,7 +46,7 @@ def read_tables(data: bytes, header: PlyHeader) -> dict[str, PlyTable]:
     Raises
     ------
     ValueError
-        The header promises more than the file holds, or a row does not fit the header.
+        The header promises more than the file holds, or a row does not match the header.
     """
     read = _text_tables if header.format == "ascii" else _binary_tables
     return read(data, header)
@@ -150,7 +150,7 @@ def _first_row(data: bytes, element: Element, order: str, position: int) -> np.d
 
 
 def _even_rows(data: bytes, element: Element, order: str, position: int) -> _Columns | None:
-    """Return the columns of a table, None unless all rows have the layout of the first."""
+    """Return the columns of a table; None unless all rows have the layout of the first."""
     kind = _first_row(data, element, order, position)
     if kind is None or position + element.rows * kind.itemsize > len(data):
         return None

@@ -1,4 +1,4 @@
-"""Vertices and polygons, as every parser returns them, with their checks."""
+"""Vertices and polygons, which every parser returns, and their checks."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ __all__ = ["PolygonMesh", "Triangles", "check_polygons", "triangulated"]
 
 
 class PolygonMesh(NamedTuple):
-    """Vertices and polygons as a file holds them.
+    """Vertices and polygons of a file.
 
     Parameters
     ----------
     V : (n, 3) float64
     corners : (k,) int64
-        Vertices of all polygons, one polygon after the other, 0-based.
+        Vertices of all polygons, polygon after polygon, 0-based.
     sizes : (m,) int64
         Number of corners per polygon.
     notices : list of str
-        What the reader did beyond reading.
+        Changes that the reader made.
     """
 
     V: FloatArray
@@ -54,7 +54,7 @@ def check_polygons(mesh: PolygonMesh) -> None:
     Raises
     ------
     ValueError
-        There are no faces or no vertices, a coordinate is not finite, a face has fewer than three
+        There are no faces or no vertices, a coordinate is not finite, or a face has fewer than three
         corners or names a vertex that does not exist.
     """
     V, corners, sizes, _ = mesh
@@ -76,7 +76,7 @@ def check_polygons(mesh: PolygonMesh) -> None:
 
 
 def triangulated(mesh: PolygonMesh) -> Triangles:
-    """Cut the polygons of a checked mesh into triangles, with a notice if there is one to cut."""
+    """Cut the polygons of a checked mesh into triangles, with a notice if there are any."""
     F, polygon = fan_triangles(mesh.corners, mesh.sizes)
     notices = list(mesh.notices)
     if len(F) > len(mesh.sizes):

@@ -1,4 +1,4 @@
-"""STL files, ASCII and binary: triangles that share no vertices, welded where corners are equal."""
+"""STL files, ASCII and binary: separate triangles, welded where corners are equal."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LARGEST = np.finfo(np.float32).max
 def parse_stl(data: bytes) -> PolygonMesh:
     """Read the facets; vertices are numbered by their first appearance.
 
-    A binary file may begin with ``solid`` as well: the size decides.
+    A binary file may begin with ``solid`` too, so the size decides.
 
     Raises
     ------
@@ -52,14 +52,14 @@ def _facets(data: bytes) -> FloatArray:
 
 
 def _ascii_facets(data: bytes) -> FloatArray:
-    """Read facets of seven lines each; the names of solids go, their facets are joined."""
+    """Read facets of seven lines each; the facets of all solids are joined, their names dropped."""
     lines = [line for line in map(bytes.strip, data.lower().splitlines()) if line]
     if lines[-1].split()[0] != b"endsolid":
         raise ValueError("it does not end with 'endsolid': the file is cut short")
     facets = [line for line in lines if line.split(None, 1)[0] not in (b"solid", b"endsolid")]
     for line, words in zip(facets, cycle(_LINES), strict=False):
         if tuple(line.split(None, len(words))[: len(words)]) != words:
-            raise ValueError(f"{shown(line)} stands where {shown(b' '.join(words))} belongs")
+            raise ValueError(f"{shown(line)} was found where {shown(b' '.join(words))} is expected")
     if len(facets) % 7:
         raise ValueError("the last facet is not complete")
     vertices = [[line[6:] for line in facets[k::7]] for k in (2, 3, 4)]
@@ -67,7 +67,7 @@ def _ascii_facets(data: bytes) -> FloatArray:
 
 
 def _welded(corners: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return the different points, and which of them every corner is."""
+    """Return the distinct points, and the index of the point of every corner."""
     target = weld_points(corners, np.arange(len(corners)), len(corners))
     if target is None:
         return corners, np.arange(len(corners))
@@ -76,7 +76,7 @@ def _welded(corners: FloatArray) -> tuple[FloatArray, IntArray]:
 
 
 def stl_bytes(V: FloatArray, F: IntArray) -> bytes:
-    """Write a binary file, which holds float32, with unit normals; zero where a face has no area."""
+    """Write a binary file, which holds float32, with unit normals, or zeros for faces without area."""
     if np.abs(V[F]).max() > _LARGEST:
         raise ValueError("a coordinate is too large for STL, which holds float32")
     facets = np.zeros(len(F), _FACET)

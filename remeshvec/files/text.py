@@ -1,8 +1,8 @@
 """Text formats: lines, and the numbers in them, parsed in blocks.
 
 A block of lines is parsed at once if every word in it is a number. Otherwise its lines are parsed one by
-one: this finds the line to refuse, or ignores words that may be anything, such as those after the
-coordinates of a vertex in an OBJ file.
+one, to find the line to refuse, or to ignore words such as those after the coordinates of a vertex in an
+OBJ file.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ __all__ = [
     "word_counts",
 ]
 
-# Python's float reads "nan", "inf" and "1_0" too; of these characters it accepts numbers alone.
+# Python's float also reads "nan", "inf" and "1_0"; with only these characters it reads only numbers.
 _FLOAT_CHARACTERS = b"0123456789+-.eE \t\n"
 _INTEGER_CHARACTERS = b"0123456789- \t\n"
-_EXACT = 1 << 53  # up to here float64 holds every integer
+_EXACT = 1 << 53  # up to here float64 represents every integer
 _INDEX = re.compile(rb"\d{1,9}")
 _COMMENT = re.compile(rb"#[^\r\n]*")
 _CONTINUED = re.compile(rb"\\[ \t]*(?:\r\n?|\n)")
@@ -41,8 +41,8 @@ def text_lines(data: bytes, continued: bool = False) -> list[bytes]:
     """Return the lines of a text in any 8-bit encoding, without comments and blank lines.
 
     Only carriage returns and line feeds end a line: form feeds and Unicode's separators may be part of a
-    name, and what follows one must not become a statement. ``continued``: a backslash at the end joins a
-    line and the next, but not in a comment, which may end with the name of a folder.
+    name, whose rest must not become a statement. With ``continued``, a backslash at the end joins a line
+    to the next, but not in a comment, which may end with the name of a folder.
     """
     if b"\0" in data:
         raise ValueError("it holds binary data or UTF-16 where text is expected")
@@ -64,13 +64,13 @@ def check_room(needed: int, available: int, unit: str) -> None:
 
 
 def shown(line: bytes) -> str:
-    """Return a line for a message: shortened, in printable characters."""
+    """Return a line for a message, shortened and in printable characters."""
     text = line[:60].decode("ascii", "replace").replace("�", "?")
     return repr(text + ("..." if len(line) > 60 else ""))
 
 
 def floats(text: bytes) -> FloatArray | None:
-    """Return the numbers of a text, None if a word is not a number."""
+    """Return the numbers of a text; None if a word is not a number."""
     if text.translate(None, _FLOAT_CHARACTERS):
         return None
     try:
@@ -89,7 +89,7 @@ def integers(text: bytes) -> IntArray | None:
 
 
 def _signs_are_in_place(text: bytes) -> bool:
-    """Tell whether every minus begins a number, in a text of digits, minuses and blanks."""
+    """Tell whether every minus begins a number in a text of digits, minuses and blanks."""
     if b"-" not in text:
         return True
     characters = np.frombuffer(b" " + text + b" ", np.uint8)
@@ -107,15 +107,15 @@ def word_counts(text: bytes) -> IntArray:
 
 
 def number_table(lines: Sequence[bytes]) -> NDArray[Any] | None:
-    """Return the numbers of lines that all hold as many, a row per line; None for other lines.
+    """Return the numbers of lines, one row per line; None unless all lines hold equally many.
 
     Returns
     -------
     (n, k) int64 or float64
-        Integers where all numbers are, because these are parsed 6 times faster.
+        Integers if all numbers are integers, because these are parsed 6 times faster.
     """
     text = b"\n".join(lines)
-    numbers: NDArray[Any] | None = None if b"-0" in text else integers(text)  # an integer has no -0
+    numbers: NDArray[Any] | None = None if b"-0" in text else integers(text)  # integers have no -0
     if numbers is None or not -_EXACT < numbers.min(initial=0) <= numbers.max(initial=0) < _EXACT:
         numbers = floats(text)
     if numbers is None or not lines:
@@ -131,12 +131,12 @@ def points(lines: Sequence[bytes], keyword: bytes = b"") -> FloatArray:
     ----------
     lines : sequence of bytes
     keyword : bytes
-        Removed from the front of every line; for the message.
+        Removed from the front of every line; used in the message.
 
     Returns
     -------
     (n, k) float64
-        All numbers where all lines hold ``k`` of them; otherwise the coordinates alone.
+        All numbers if all lines hold ``k`` of them; otherwise only the coordinates.
     """
     table = number_table(lines)
     if table is None or table.shape[1] < 3 or not np.isfinite(table[:, :3]).all():
@@ -152,9 +152,9 @@ def _point(line: bytes, keyword: bytes) -> FloatArray:
 
 
 def polygons(lines: Sequence[bytes]) -> tuple[IntArray, IntArray]:
-    """Return corners and sizes of faces, lines of a number of corners and as many indices.
+    """Return corners and sizes of faces; each line holds a number of corners and as many indices.
 
-    Whatever follows the indices, such as colours, is ignored.
+    Anything after the indices, such as colours, is ignored.
     """
     text = b"\n".join(lines)
     numbers, counts = integers(text), word_counts(text)

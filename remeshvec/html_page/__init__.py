@@ -1,4 +1,4 @@
-"""One page of HTML that shows a result, with Plotly inside (the extra ``[html]``)."""
+"""An HTML page that shows a result, with Plotly inside (the extra ``[html]``)."""
 
 from .page import (
     PAGE_SUFFIXES,

@@ -1,4 +1,4 @@
-"""The histograms of the HTML page, counted here, so that the page holds bars instead of all values."""
+"""The histograms of the HTML page, counted here so that the page holds only the bars."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["build_charts"]
 
 
 BARS = 50
-MOST_VALENCE = 12  # larger valences are counted with it
+MOST_VALENCE = 12  # larger valences are counted as this one
 
 
 def build_charts(
@@ -27,7 +27,7 @@ def build_charts(
     elements : (Elements, Elements)
         Edges and faces of the meshes before and after.
     qualities : (Quality, Quality)
-        Measures of the same meshes, which hold the valences.
+        Measures of the same meshes; they hold the valences.
     length : float
         Target length L, the unit of lengths; the unit of areas is an equilateral triangle with edges L.
 
@@ -46,7 +46,7 @@ def build_charts(
         _valences(qualities),
         _lengths_like(
             "Areas",
-            "area of faces / that of an equilateral one with edges L",
+            "face area / area of an equilateral face with edges L",
             elements,
             lambda one: one.areas / unit_area,
         ),
@@ -59,7 +59,7 @@ def _lengths_like(
     elements: tuple[Elements, Elements],
     measure: Callable[[Elements], FloatArray],
 ) -> dict[str, Any]:
-    """Count values without an upper bound; the last bar may take the largest half percent."""
+    """Count values without an upper bound; the last bar may hold the largest half percent."""
     values = [measure(one) for one in elements]
     top = float(np.clip(max(np.percentile(v, 99.5) if len(v) else 0 for v in values), 1.9, 3.9))
     top = np.ceil(10 * top + 1) / 10
@@ -91,7 +91,7 @@ def _chart(
     above = [int(np.count_nonzero(v > edges[-1])) for v in values]
     return {
         "name": name,
-        "axis": axis + (" (the last bar: and more)" if any(above) else ""),
+        "axis": axis + (" (last bar: and more)" if any(above) else ""),
         "ideal": ideal,
         "width": float(edges[1] - edges[0]),
         "centres": [round(float(x), 6) for x in (edges[1:] + edges[:-1]) / 2],

@@ -1,11 +1,11 @@
-"""One page of HTML that shows a result, with Plotly inside (the extra ``[html]``).
+"""An HTML page that shows a result, with Plotly inside (the extra ``[html]``).
 
 `html_report` returns the page, `write_html` writes it, `show_html` shows it in a notebook or in the
-browser. The page loads nothing: it contains its scripts, styles and meshes, and its own policy forbids
-the browser to use the network. The same result gives the same page, bit for bit.
+browser. The page loads nothing: it contains its scripts, styles and meshes, and its security policy
+forbids the use of the network. The same result gives the same page, bit for bit.
 
-`views` and `charts` make 3D views and histograms as plain data, and ``report.js`` draws them. Meshes go
-to Plotly as typed arrays, which all its versions accept.
+`views` and `charts` make 3D views and histograms as plain data, and ``report.js`` draws them. Meshes are
+passed to Plotly as typed arrays, which all its versions accept.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def html_report(result: RemeshResult, *, title: str = "", command: str = "", up:
     Parameters
     ----------
     result : RemeshResult
-        Result of `remesh`. The page reads the arrays that `remesh` was called with again.
+        Result of `remesh`. The page reads the input arrays again.
     title : str
         Heading, such as the name of the mesh.
     command : str
@@ -152,10 +152,10 @@ def write_html(
 
 
 def show_html(result: RemeshResult, *, title: str = "", up: str = "y") -> None:
-    """Show the page of `html_report`: below the cell of a Jupyter notebook, else in the browser.
+    """Show the page of `html_report` below the cell of a Jupyter notebook, or in the browser.
 
-    A saved notebook contains the page, about 5 MB. For a browser, the page is a file in the folder for
-    temporary files, which stays there; if there is no browser, its name is printed.
+    A saved notebook contains the page, about 5 MB. For a browser, the page is written to the folder for
+    temporary files and stays there; if there is no browser, its path is printed.
 
     Parameters and errors are those of `html_report`.
     """
@@ -185,7 +185,7 @@ def require_plotly() -> Any:
 
 
 def _report_of(result: Any) -> Report:
-    """Return the report of a result, whose type this folder must not import."""
+    """Return the report of a result; this folder must not import its type."""
     report = getattr(result, "report", None)
     if not hasattr(report, "quality_after"):
         raise OptionError(
@@ -202,7 +202,7 @@ def _is_in_notebook() -> bool:
 
 
 def _page_frame(page: str) -> str:
-    """Wrap a page in a frame that keeps its styles and names apart from those of the notebook."""
+    """Wrap a page in a frame that separates its styles and names from those of the notebook."""
     return (
         f'<div><iframe srcdoc="{html.escape(page)}" sandbox="allow-scripts allow-downloads" '
         f'style="width:100%;height:{FRAME_HEIGHT}px;border:0"></iframe></div>'
@@ -245,7 +245,7 @@ def _summary_table(report: Report) -> str:
 
 
 def _tiles(before: Quality, after: Quality) -> str:
-    """Return tiles with the figures that most readers want, before and after."""
+    """Return tiles with the most important figures, before and after."""
     chosen = (
         "faces",
         "edges in 4/5 to 4/3 L",
@@ -270,7 +270,7 @@ def _degrees(text: str) -> str:
 
 
 def _call(report: Report, command: str) -> str:
-    """Return a table of the call and of what the report noted."""
+    """Return a table of the call and of the notes in the report."""
     rows = [("call", command)] if command else []
     rows += [("sweeps ended", report.stop)]
     rows += [(f"input: {_words(name)}", f"{n:,}") for name, n in report.dirt.items()]

@@ -15,10 +15,10 @@ from ..viz.pictures import UP, Camera, three_quarter_view
 __all__ = ["COLOURINGS", "MOST_EDGED", "MOST_FACES", "Views", "build_views"]
 
 
-# At these limits Chromium draws a page within 4 to 7 seconds on two cores without a graphics card, and
+# At these limits Chromium takes 4 to 7 seconds to draw a page on two cores without a graphics card, and
 # the page has 16 MB.
-MOST_FACES = 200_000  # of a mesh that is shown whole
-MOST_EDGED = 50_000  # faces with edges drawn, and faces shown of a larger mesh
+MOST_FACES = 200_000  # of a mesh shown as a whole
+MOST_EDGED = 50_000  # faces drawn with edges, and faces shown of a larger mesh
 
 # Red to blue [ColorBrewer, RdYlBu] and brown to green [BrBG]: safe for the colour-blind.
 _SHAPE_COLOURS = ("#7d0a1e", "#c8282c", "#ee6a43", "#fbb165", "#fdebb0", "#cfe6f0", "#8dbfdd")
@@ -28,21 +28,21 @@ COLOURINGS: tuple[dict[str, Any], ...] = (
     {
         "key": "shape",
         "name": "shape",
-        "title": "2 × inradius / circumradius: 1 is equilateral, 0 has no area",
+        "title": "2 × inradius / circumradius: 1 is equilateral, 0 means no area",
         "colours": _SHAPE_COLOURS,
         "ticks": ("0", "0.25", "0.5", "0.75", "1"),
     },
     {
         "key": "angle",
         "name": "smallest angle",
-        "title": "smallest angle of the triangle: 60° is equilateral",
+        "title": "smallest angle of the triangle; 60° is equilateral",
         "colours": _SHAPE_COLOURS,
         "ticks": ("0°", "15°", "30°", "45°", "60°"),
     },
     {
         "key": "area",
         "name": "area",
-        "title": "area, as a multiple of that of an equilateral triangle with edges L",
+        "title": "area relative to an equilateral triangle with edges L",
         "colours": _AREA_COLOURS,
         "ticks": ("¼ and less", "½", "1", "2", "4 and more"),
     },
@@ -50,7 +50,7 @@ COLOURINGS: tuple[dict[str, Any], ...] = (
 
 
 class Views(NamedTuple):
-    """The scene, and notes about it for the reader."""
+    """The scene, with notes for the reader."""
 
     scene: dict[str, Any]  # JSON-ready
     notes: list[str]
@@ -66,7 +66,7 @@ def build_views(
     meshes : (Elements, Elements)
         The meshes before and after.
     qualities : (Quality, Quality)
-        Measures of the same meshes; the sign of the volume tells which side is outside.
+        Measures of the same meshes; the sign of the volume shows which side is outside.
     length : float
         The target length L, the unit of areas.
     up : {"y", "z"}
@@ -75,8 +75,8 @@ def build_views(
     Returns
     -------
     Views
-        Coordinates are float32, relative to the middle of the shown part and at most 1 from it, so they
-        lose no digits to size or place.
+        Coordinates are float32, relative to the middle of the shown part and at most 1 from it, so that
+        neither size nor position costs digits.
     """
     camera = three_quarter_view(meshes[0].V, meshes[0].F, UP[up])
     shown = _shown_faces(meshes, camera)
@@ -155,7 +155,7 @@ def _notes(meshes: tuple[Elements, Elements], shown: list[IntArray], with_edges:
     if any(len(kept) < len(mesh.F) for mesh, kept in zip(meshes, shown, strict=True)):
         notes.append(
             f"The views show a part of the surface, {len(shown[0]):,} faces before and "
-            f"{len(shown[1]):,} after, so that browsers can turn it; all numbers and histograms are of "
+            f"{len(shown[1]):,} after, so that browsers can turn it; all numbers and histograms refer to "
             "the whole surface."
         )
     if not with_edges:

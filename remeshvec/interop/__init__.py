@@ -1,1 +1,1 @@
-"""Mesh objects of other libraries, with the data they carry."""
+"""Mesh objects of other libraries, with their data."""

@@ -1,4 +1,4 @@
-"""A mesh with its data, on the way from an object or a file through `remesh` and back."""
+"""A mesh with its data, taken from an object or a file, and the transfer of the data to a result."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class MeshData:
     on_vertices, on_faces, on_corners : dict of arrays
         By name: (n, ...), (m, ...), (m, 3, ...).
     feature_data : tuple of str
-        Names of data whose jumps or borders are features: texture coordinates, groups.
+        Names of data whose jumps or borders are features, such as texture coordinates and groups.
     directions : tuple of str
         Names of data on vertices that are unit vectors.
     wrap : callable, optional
-        Makes an object of the type that this was read from.
+        Makes an object of the same type as the one that was read.
     extra : dict
-        Further information that readers of files leave for writers: textures, materials.
+        Further information that file readers pass to writers, such as textures and materials.
     """
 
     V: NDArray[Any]
@@ -59,7 +59,7 @@ class MeshData:
         return [*map(self.find, self.feature_data), *several] or None
 
     def find(self, name: str) -> NDArray[Any]:
-        """Return data on faces or corners by name, data on vertices spread to corners."""
+        """Return data by name on faces or corners; data on vertices are spread to corners."""
         for data in (self.on_faces, self.on_corners):
             if name in data:
                 return data[name]
@@ -74,7 +74,7 @@ def corner_values(values: NDArray[Any], F: NDArray[Any]) -> NDArray[Any]:
 def carry(data: MeshData, result: Any) -> MeshData:
     """Transfer all data of a mesh to the result of ``remesh``.
 
-    Where several vertices lay in one place with different data, as at texture seams, the new vertices on
+    Where several vertices lie in one place with different data, as at texture seams, the new vertices on
     the same curves are doubled.
     """
     F = np.asarray(result.F)
@@ -120,13 +120,13 @@ def split_vertices(
     Returns
     -------
     corner : (k,) int64
-        For every new vertex one of its corners ``3 f + c``.
+        One corner ``3 f + c`` of every new vertex.
     F : (m, 3)
         Faces of the new vertices, in the dtype of the old.
     """
     h = np.arange(F.size)
     after = h + 1 - 3 * (h % 3 == 2)
-    # Half-edges of one edge come one after the other; the corners at both its ends are compared.
+    # Half-edges of one edge follow each other; the corners at both ends of the edge are compared.
     key = edge_keys(halfedge_ends(F), int(F.max()) + 1)
     order = np.argsort(key, kind="stable")
     one, two = order[:-1], order[1:]
@@ -164,7 +164,7 @@ def _data_agree(values: NDArray[Any], one: NDArray[Any], two: NDArray[Any]) -> N
 
 
 def _method(values: NDArray[Any]) -> str:
-    """Choose how to transfer data: colours in bytes are mixed, other integers are labels."""
+    """Choose how to transfer data: colours in bytes are interpolated, other integers are labels."""
     is_colour = values.dtype.kind == "u" and values.ndim == 2 and values.shape[1] in (3, 4)
     return "linear" if is_colour else "auto"
 

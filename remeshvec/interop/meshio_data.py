@@ -16,11 +16,11 @@ from .mesh_data import Data, MeshData
 
 __all__ = ["is_meshio", "read_meshio", "write_meshio"]
 
-# Cells that surfaces consist of, and those that may lie on them and are left out.
+# Cells that make up surfaces, and cells that may lie on them and are left out.
 _FACE_CELLS = ("triangle", "quad", "polygon")
 _LOWER = ("vertex", "line")
 
-# Cell data in which programs number the parts of a mesh.
+# Names of cell data in which programs number the parts of a mesh.
 GROUPS = ("gmsh:physical", "gmsh:geometrical", "medit:ref", "cell_tags", "group", "material")
 
 _BLOCK, _SET = "meshio:block", "meshio:set:"
@@ -34,8 +34,8 @@ def is_meshio(value: Any) -> bool:
 def read_meshio(mesh: Any) -> MeshData:
     """Read a ``meshio.Mesh`` of triangles, quadrilaterals or polygons, in the plane or in space.
 
-    Cell data, cell sets and blocks become data on faces. Borders of blocks, of sets, and of groups under
-    the names that mesh generators use are feature data.
+    Cell data, cell sets and blocks become data on faces. Blocks, sets, and groups under the names that
+    mesh generators use are feature data: their borders are kept.
     """
     blocks = [(i, block) for i, block in enumerate(mesh.cells) if block.type in _FACE_CELLS]
     _check_blocks(mesh, blocks)
@@ -76,7 +76,9 @@ def _check_blocks(mesh: Any, blocks: list[Any]) -> None:
         )
     left_out = [*(kinds & set(_LOWER)), *(["point sets"] if mesh.point_sets else [])]
     if left_out:
-        warnings.warn(f"{', '.join(sorted(left_out))} are not remeshed and left out", stacklevel=6)
+        warnings.warn(
+            f"{', '.join(sorted(left_out))} are not remeshed and are left out", stacklevel=6
+        )
 
 
 def _triangles(cells: Any) -> tuple[IntArray, IntArray]:

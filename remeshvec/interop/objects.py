@@ -33,12 +33,12 @@ def read_object(mesh: Any) -> MeshData:
     Raises
     ------
     MeshInputError
-        The object holds no triangles, or its type is unknown.
+        The object does not hold triangles, or its type is unknown.
     """
     for knows, read in _KINDS:
         if knows(mesh):
             data = read(mesh)
-            as_mesh(data.V, data.F)  # before data are looked up by faces
+            as_mesh(data.V, data.F)  # checked before data are indexed by faces
             return data
     if isinstance(mesh, str | os.PathLike):
         raise MeshInputError(f"{mesh} is a path: remesh_file remeshes files, read_mesh reads them")
@@ -60,7 +60,7 @@ def _rows(data: Any, count: int) -> Data:
 
 # -- trimesh ----------------------------------------------------------------------------------
 
-# Names that do not collide with those of attributes.
+# Names that do not collide with names of attributes.
 UV, COLOUR, MATERIAL = "visual:uv", "visual:colour", "visual:material"
 
 
@@ -122,12 +122,10 @@ def _is_pyvista(value: Any) -> bool:
 def read_pyvista(mesh: Any) -> MeshData:
     """Read a ``pyvista.PolyData`` with point, cell and field data."""
     if not _has(mesh, "is_all_triangles", "regular_faces"):
-        raise MeshInputError(
-            f"{type(mesh).__name__} is not a surface; take mesh.extract_surface() of it"
-        )
+        raise MeshInputError(f"{type(mesh).__name__} is not a surface; use mesh.extract_surface()")
     others = mesh.n_lines + mesh.n_verts
     if others:
-        _warn(f"{others} lines and vertex cells are not remeshed and left out")
+        _warn(f"{others} lines and vertex cells are not remeshed and are left out")
     surface = mesh if mesh.is_all_triangles and not others else mesh.triangulate()
     if not surface.n_cells:
         raise MeshInputError("the PolyData has no faces")

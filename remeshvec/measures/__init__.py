@@ -1,1 +1,1 @@
-"""Numbers about meshes: quality, and the distance of two surfaces."""
+"""Measures of meshes: quality, and the distance between two surfaces."""

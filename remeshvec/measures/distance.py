@@ -1,4 +1,4 @@
-"""How far two surfaces are apart: Hausdorff, RMS and mean distance from samples."""
+"""Distance between two surfaces: Hausdorff, RMS and mean, from samples."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def surface_distance(
 ) -> SurfaceDistance:
     """Measure how far two surfaces are apart, in both directions.
 
-    Sampled are all vertices that a face uses, and `samples` points on the faces, spread evenly over
-    the area by a low-discrepancy sequence.  Each sample's distance to the other surface is exact
+    The samples are all vertices that a face uses, and `samples` points on the faces, spread evenly over
+    the area by a low-discrepancy sequence.  The distance of each sample to the other surface is exact
     (libigl's closest point).  The maxima run over all samples and are therefore lower bounds of the
     true one-sided distances, which exceed them by at most the distance from a surface point to the
     nearest sample.  RMS and mean run over the points on the faces, so they are integrals over the

@@ -1,4 +1,4 @@
-"""How good a triangle mesh is: edge lengths, angles, valences, areas, topology.
+"""Quality of a triangle mesh: edge lengths, angles, valences, areas, topology.
 
 Shares and relative figures are fractions (0 to 1), angles are degrees, lengths are those of the
 input.
@@ -25,11 +25,11 @@ NARROW_ANGLE = 30.0  # degrees; below it a triangle counts as narrow
 
 @dataclass(frozen=True)
 class Quality:
-    """Measures of one triangle mesh; what each is stands beside it.
+    """Measures of one triangle mesh, each explained in a comment.
 
     A vertex is *inner* when every edge at it has two faces, a *boundary* vertex when an edge at it
     has one face.  Faces that name a vertex twice are counted in `degenerate_faces` and left out of
-    everything else, unreferenced vertices likewise.
+    everything else, and so are unreferenced vertices.
     """
 
     vertices: int  # those that a face uses
@@ -61,11 +61,11 @@ class Quality:
     boundary_loops: int  # counted after pinched vertices are parted into their fans
     nonmanifold_edges: int  # edges with more than two faces
     nonmanifold_vertices: int  # vertices whose faces form more than one fan
-    misoriented_edges: int  # edges that two faces run the same way
+    misoriented_edges: int  # edges that two faces run along in the same direction
     components: int  # of faces joined along edges
     euler_number: int  # vertices - edges + faces
     area: float
-    volume: float | None  # signed (outward normals: positive); None for a surface that is open
+    volume: float | None  # signed, positive for outward normals; None for an open surface
 
     @property
     def is_closed(self) -> bool:
@@ -80,7 +80,7 @@ class Quality:
         }
 
     def rows(self) -> list[tuple[str, str]]:
-        """Return the table: a label and a formatted value a row."""
+        """Return the table: a label and a formatted value per row."""
         valence6 = _percent(self.valence6_inner) if self.inner_vertices else "-"
         valence4 = _percent(self.valence4_boundary) if self.boundary_vertices else "-"
         return [
@@ -194,7 +194,7 @@ class Elements(NamedTuple):
 def elements(V: ArrayLike, F: ArrayLike) -> Elements:
     """Measure every edge and face; parameters and errors are those of `quality`.
 
-    As there, faces that name a vertex twice and unreferenced vertices are left out.
+    Faces that name a vertex twice and unreferenced vertices are left out there too.
     """
     V, F = as_mesh(V, F)
     used, F = _referenced(F[~_is_repeated(F)], len(V))
@@ -216,7 +216,7 @@ class _Corners(NamedTuple):
     squared: FloatArray  # (m, 3), of the edge opposite each corner
     angle: FloatArray  # (m, 3), degrees
     area: FloatArray  # (m,)
-    is_flat: BoolArray  # (m,), no area but for rounding
+    is_flat: BoolArray  # (m,), no area beyond rounding
 
 
 class _Edges(NamedTuple):
@@ -226,7 +226,7 @@ class _Edges(NamedTuple):
     lengths: FloatArray  # (e,)
     uses: IntArray  # (e,), faces at each edge
     net: IntArray  # (e,), uses in one direction minus uses in the other
-    boundary: IntArray  # half-edges that are alone on their edge
+    boundary: IntArray  # half-edges of edges with one face
     pairs: IntArray  # (p, 2), half-edges that share an edge with two faces
     neighbours: IntArray  # (q, 2), half-edges that follow each other on any edge
 
@@ -247,7 +247,7 @@ def _referenced(F: IntArray, n: int) -> tuple[BoolArray, IntArray]:
 
 
 def _unit_box(X: FloatArray) -> tuple[FloatArray, float]:
-    """Move and scale into a unit box, so that no product of lengths under- or overflows."""
+    """Move and scale into a unit box, so that products of lengths neither underflow nor overflow."""
     if len(X) == 0:
         return X, 1.0
     low, high = X.min(axis=0), X.max(axis=0)
@@ -260,11 +260,11 @@ def _corner_geometry(X: FloatArray, F: IntArray) -> _Corners:
     opposite = P[:, [2, 0, 1]] - P[:, [1, 2, 0]]  # (m, 3, 3), edge facing a corner
     squared = np.einsum("fci,fci->fc", opposite, opposite)
     double_area = np.linalg.norm(np.cross(opposite[:, 0], opposite[:, 1]), axis=1)
-    # 0 - x, not -x: a zero-length edge must give +0, for arctan2(0, -0) is 180 degrees.
+    # 0 - x, not -x: a zero-length edge must give +0, because arctan2(0, -0) is 180 degrees.
     cosine = 0 - np.einsum("fci,fci->fc", opposite[:, [1, 2, 0]], opposite[:, [2, 0, 1]])
     angle = np.degrees(np.arctan2(double_area[:, None], cosine))
-    # In the unit box the coordinates carry a rounding error of about one epsilon, hence so do
-    # heights; a height of 8 epsilon or less is none.
+    # In the unit box, coordinates and hence heights carry a rounding error of about one epsilon;
+    # heights of 8 epsilon or less count as 0.
     is_flat = double_area <= 8 * np.finfo(float).eps * np.sqrt(squared.max(axis=1, initial=0))
     return _Corners(squared, angle, double_area / 2, is_flat)
 
@@ -326,7 +326,7 @@ def _radius_ratios(corners: _Corners) -> FloatArray:
     below = lengths.prod(axis=1) * lengths.sum(axis=1)
     ratio = np.zeros(len(below))
     np.divide(16 * corners.area**2, below, out=ratio, where=below > 0)
-    return np.minimum(ratio, 1.0)  # rounding goes above
+    return np.minimum(ratio, 1.0)  # rounding may exceed 1
 
 
 def _valence_measures(edges: _Edges, n: int) -> dict[str, Any]:
@@ -411,7 +411,7 @@ def _relative_mean_error(areas: FloatArray) -> float:
 
 
 def _enclosed_volume(X: FloatArray, F: IntArray, edges: _Edges, unit: float) -> float | None:
-    """Signed volume; None unless each edge is run as often one way as the other."""
+    """Signed volume; None unless faces run along each edge equally often in both directions."""
     if len(F) == 0 or edges.net.any():
         return None
     a, b, c = X[F[:, 0]], X[F[:, 1]], X[F[:, 2]]

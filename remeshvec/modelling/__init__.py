@@ -1,1 +1,1 @@
-"""What a surface is remeshed for: Laplacians, fairing, editing, smoothing."""
+"""Uses of a remeshed surface: Laplacians, fairing, editing, smoothing."""

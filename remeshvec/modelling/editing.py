@@ -33,7 +33,7 @@ def deform(
 ) -> FloatArray:
     """Move a handle, hold some vertices, and let the others follow smoothly.
 
-    Makes an `Editor` and calls `Editor.move` once. Parameters and errors are theirs.
+    Makes an `Editor` and calls `Editor.move` once, with the same parameters and errors.
 
     Returns
     -------
@@ -145,7 +145,7 @@ class Editor:
 
 @dataclass(frozen=True)
 class Region:
-    """A mesh, and which of its vertices are in the handle, fixed, or in the support."""
+    """A mesh with masks of the vertices in the handle, fixed, and in the support."""
 
     V: FloatArray
     F: IntArray
@@ -181,7 +181,7 @@ class Region:
 
 
 def as_transform(transform: Transform, points: FloatArray) -> tuple[FloatArray | None, FloatArray]:
-    """Return the affine map (3, 4), or None if it is not one, and the new places of the points."""
+    """Return the affine map (3, 4), or None if there is none, and the new positions of the points."""
     value = transform(points.copy()) if callable(transform) else transform
     array = as_array(value, "transform")
     if array.dtype.kind not in "fiu" or not np.isfinite(array).all():

@@ -1,4 +1,4 @@
-"""Fair surfaces: ``Delta^k x = 0`` in a region, which joins its surroundings with continuity C^(k-1)."""
+"""Fair surfaces: ``Delta^k x = 0`` in a region that joins its surroundings with continuity C^(k-1)."""
 
 from __future__ import annotations
 
@@ -80,8 +80,8 @@ def fair(
 class Polyharmonic:
     """The system ``Delta^k x = 0`` at some vertices of a mesh, factored.
 
-    With a length it is ``x + (-length^2 Delta)^k x = y``: waves much longer than ``2 pi length`` pass,
-    shorter ones do not [Desbrun et al. 1999, section 4.2]. The system contains only the faces around the
+    With a length it is ``x + (-length^2 Delta)^k x = y``: waves much longer than ``2 pi length`` remain,
+    shorter ones vanish [Desbrun et al. 1999, section 4.2]. The system contains only the faces around the
     free vertices.
     """
 
@@ -98,7 +98,9 @@ class Polyharmonic:
         used = used_vertices(F[near], len(V))
         lonely = np.flatnonzero(free & ~used)
         if len(lonely):
-            raise OptionError(f"{which(lonely, 'vertex')} that should move belong to no face of F")
+            raise OptionError(
+                f"{which(lonely, 'vertex')} that should move do not belong to a face of F"
+            )
         self.vertices = np.flatnonzero(used)
         number = np.full(len(V), -1, np.int64)
         number[self.vertices] = np.arange(len(self.vertices))

@@ -1,7 +1,7 @@
 """Discrete Laplacians of triangle meshes: libigl's cotangents over Voronoi or uniform areas.
 
-Sign: that of the sum of second derivatives; matrices are negative semidefinite. Units: the cotangent
-matrix has none, areas are in squared units of V, so the Laplacian is in inverse squared units of V.
+The sign is that of the sum of second derivatives: matrices are negative semidefinite. The cotangent
+matrix is dimensionless and areas are in squared units of V, so the Laplacian is in their inverse.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def cotangent_matrix(V: ArrayLike, F: ArrayLike) -> sp.csc_array:
     if not np.isfinite(C.data).all():
         flat = np.flatnonzero(~np.isfinite(igl.cotmatrix_entries(vertices, faces)).all(axis=1))
         raise MeshInputError(
-            f"{which(flat, 'face')} of F have no area, or only that of rounding errors, so that "
+            f"{which(flat, 'face')} of F have no area beyond rounding errors, so that "
             "cotangents are infinite; remesh first, or drop them"
         )
     # libigl adds up the two halves in different orders, which breaks the symmetry by rounding errors.
@@ -138,7 +138,7 @@ def laplacian(
     if is_symmetric:
         root = np.sqrt(inverse)
         scaled = C.tocoo()
-        data = scaled.data * (root[scaled.row] * root[scaled.col])  # the same both ways
+        data = scaled.data * (root[scaled.row] * root[scaled.col])  # symmetric, bit for bit
         return sp.csc_array(sp.coo_array((data, (scaled.row, scaled.col)), C.shape))
     return sp.csc_array(sp.diags_array(inverse) @ C)
 

@@ -18,8 +18,8 @@ def part_of_motion(
     """Move every point by its own share of an affine map.
 
     The map is a stretch about ``centre``, then a rotation (polar decomposition), then a translation. The
-    rigid part is a screw motion: a point goes the share w of its helix. The stretch is interpolated
-    linearly.
+    rigid part is a screw motion: a point moves along the share w of its helix. The stretch is
+    interpolated linearly.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def part_of_motion(
     turns = Rotation.from_rotvec(w[:, None] * omega)
     if angle < _NO_TURN:
         return np.asarray(centre + turns.apply(away) + w[:, None] * shift)
-    # With the part of the shift across the axis, the turn is one about another point.
+    # The part of the shift across the axis makes the turn one about another point.
     axis = omega / angle
     along = axis * (axis @ shift)
     across = shift - along
@@ -56,7 +56,7 @@ def part_of_motion(
 
 
 def rotations_between(P: FloatArray, Q: FloatArray, F: IntArray) -> FloatArray:
-    """Rotation (n, 3, 3) per vertex from P to Q: the nearest to the mean gradient around it.
+    """Rotation (n, 3, 3) per vertex from P to Q: the one nearest to the mean gradient around it.
 
     The gradient of a face takes its unit normal in P to that in Q. Gradients are weighted by the areas of
     the faces in P.

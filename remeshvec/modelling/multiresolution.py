@@ -32,8 +32,8 @@ __all__ = ["EditedSurface", "MultiresolutionEditor"]
 _SHORT, _LONG = 0.5, 1.5
 _SMALL_ANGLE = 28.0
 
-# How often the base is remeshed in one move, at most: where triangles were long at rest, new vertices
-# come to lie beside the triangles that they were made on.
+# Most remeshings of the base in one move: where triangles are long at rest, new vertices come to lie
+# beside the triangles that they were made on.
 _MOST_REMESHINGS = 4
 
 
@@ -52,7 +52,7 @@ class EditedSurface:
     support : (n,) bool
         Vertices that are neither handle nor fixed.
     remeshed : int
-        How often the support has been remeshed since the surface was at rest.
+        Number of remeshings of the support since the surface was at rest.
     """
 
     V: FloatArray
@@ -80,8 +80,8 @@ class MultiresolutionEditor:
     V, F, handle, fixed, k, area
         As for `Editor`; k is the order of the base, and of the shares.
     detail_size : float, optional
-        Waves of the support shorter than about this, in units of V, are details. By default the details
-        are all that `fair` removes: right for a patch, but the fair surface of a long tube has no volume.
+        Waves of the support shorter than about this, in units of V, are details. By default, details are
+        all that `fair` removes: this suits a patch, but the fair surface of a long tube has no volume.
     length : float, optional
         Edge length to which the support is remeshed, in units of V. By default the mean length of its
         edges at rest.
@@ -142,7 +142,7 @@ class MultiresolutionEditor:
         ----------
         *transforms : (4, 4) or (3, 4) float, (h, 3) float, or callable
             As for `Editor.move`. Several are a path: each starts from the result of the one before, so
-            that four quarter turns are a whole one.
+            that four quarter turns are a full turn.
 
         Returns
         -------
@@ -188,7 +188,7 @@ class MultiresolutionEditor:
         return x + self._at_rest(now, displacement)
 
     def _placed(self, now: _Current, motion: list[_Step]) -> FloatArray:
-        """Return the base after a motion, at the vertices of now."""
+        """Return the base after a motion, at the current vertices."""
         x = self._at_rest(now, self.base)
         for step in motion:
             x = step(now, x)
@@ -236,7 +236,7 @@ class MultiresolutionEditor:
         return born, np.asarray(igl.barycentric_coordinates(closest, a, b, c))
 
     def _at_rest(self, now: _Current, values: FloatArray) -> FloatArray:
-        """Values (n, c) on the surface at rest, interpolated at the vertices of now."""
+        """Values (n, c) on the surface at rest, interpolated at the current vertices."""
         corners = values[self._F[now.birth_face]]
         return np.asarray(np.einsum("vc,vcx->vx", now.birth_barycentric, corners))
 
@@ -266,7 +266,7 @@ _Step = Callable[[_Current, FloatArray], FloatArray]
 
 
 def _own_births(n: int, F: IntArray) -> tuple[IntArray, FloatArray]:
-    """Births at the vertices of a mesh: a face of each and its corner; arbitrary without a face."""
+    """Births at the vertices of a mesh: a face and its corner; arbitrary for vertices without a face."""
     face, corner = np.zeros(n, np.int64), np.zeros(n, np.int64)
     for c in range(3):
         face[F[:, c]] = np.arange(len(F))

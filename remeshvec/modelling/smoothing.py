@@ -34,9 +34,9 @@ def smooth(
 ) -> FloatArray:
     """Smooth a surface by mean curvature flow, with implicit steps.
 
-    Each step solves ``(M - step C) x' = M x`` [Desbrun et al. 1999, section 2.3], M the vertex areas
-    and C the cotangent matrix of the surface before it. Waves shorter than about ``2 pi sqrt(step)``
-    vanish. The system is symmetric and positive definite for any step.
+    Each step solves ``(M - step C) x' = M x`` [Desbrun et al. 1999, section 2.3], where M are the
+    vertex areas and C is the cotangent matrix of the surface before the step. Waves shorter than about
+    ``2 pi sqrt(step)`` vanish. The system is symmetric and positive definite for any step.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def smooth(
     Raises
     ------
     MeshInputError
-        V and F are not a mesh; or a face has no area, or lost it in a step where a thin part vanishes
+        V and F are not a mesh; a face has no area, or lost it in a step in which a thin part vanishes
         (remesh between steps, or take fewer); or ``keep_volume`` is set for a surface that is not closed.
     OptionError
         ``step`` is not positive, or another option is invalid.
@@ -114,7 +114,7 @@ def _flow(
         if i == 0:
             raise
         raise MeshInputError(f"after {i} steps: {error}") from error
-    # Vertices between vanishing faces may have an area of 0; they are fair already.
+    # Vertices between vanishing faces may have an area of 0; they are already fair.
     mass = np.maximum(vertex_areas(x, F, area), np.finfo(float).tiny)
     A = sp.diags_array(mass) - time * C
     solved = LaplacianSolver(A, stays).solve(mass[:, None] * x, x[stays])

@@ -22,7 +22,7 @@ FACTORISATIONS = ("auto", "cholesky", "cholmod", "lu")
 # Entries of a matrix and its transpose count as equal below this difference, relative to the largest.
 _SYMMETRY = 1e-12
 
-# A row counts as summing to 0 below this, relative to the sum of absolute values: constants solve it.
+# Below this sum, relative to that of absolute values, a row counts as summing to 0: constants solve it.
 _ZERO_SUM = 1e-13
 
 # A factor is useless beyond this residual, relative to |A| |x| + |b|.
@@ -42,7 +42,7 @@ class LaplacianSolver:
     fixed : (k,) int or (n,) bool, optional
         Vertices with given values.
     method : {"auto", "cholesky", "cholmod", "lu"}
-        Factorisation. "cholesky" is Eigen's simplicial one, from libigl: the fastest to factor. "cholmod"
+        Factorisation. "cholesky" is Eigen's simplicial one, from libigl, which factors fastest. "cholmod"
         is SuiteSparse's, from the package cholespy (``pip install 'remeshvec[cholmod]'``): it takes twice
         as long to factor and 0.4 of the time to solve, so it pays from about 15 solves on. "lu" is
         SuperLU, from SciPy. "auto" is "cholesky" where the part of A between free vertices is symmetric
@@ -95,7 +95,7 @@ class LaplacianSolver:
         Parameters
         ----------
         b : (n,) or (n, c) float, optional
-            Right-hand sides; only the rows of free vertices count. 0 by default.
+            Right-hand sides; only the rows of free vertices are used. 0 by default.
         x_fixed : (k,) or (k, c) float, optional
             Values at the fixed vertices, in the order of their indices; 0 by default.
 
@@ -128,7 +128,7 @@ class LaplacianSolver:
         return x
 
     def _check_factor(self) -> None:
-        """Solve once, to find matrices that are nearly singular or not definite: they give nonsense."""
+        """Solve once, to detect nearly singular or indefinite matrices, which give wrong results."""
         if not self.n_free:
             return
         b = np.random.default_rng(0).normal(size=self.n_free)
@@ -139,7 +139,7 @@ class LaplacianSolver:
             is_good = is_good and np.abs(x).max() < 1e15 * np.abs(b).max() / abs(self._inner).max()
         if not is_good:
             raise SingularSystemError(
-                "the matrix is singular, or nearly, between the free vertices; fix more vertices, "
+                "the matrix is singular, or nearly so, between the free vertices; fix more vertices, "
                 "remesh faces of bad shape, or take a smaller order"
             )
 
@@ -158,7 +158,7 @@ def _as_matrix(A: Any) -> sp.csc_array:
 
 
 def _check_parts(inner: sp.csc_array, across: sp.csr_array, free: NDArray[np.intp]) -> None:
-    """Refuse parts that are not coupled to a fixed vertex and whose equations constants solve."""
+    """Refuse parts whose equations constants solve and that are not coupled to a fixed vertex."""
     if not len(free):
         return
     size = np.asarray(abs(inner).sum(axis=1) + abs(across).sum(axis=1))
@@ -190,7 +190,7 @@ def _choose(inner: sp.csc_array, method: str) -> str:
     if not suits:
         raise OptionError(
             f"method={method!r} needs a symmetric matrix with diagonal entries of one sign; "
-            'take laplacian(V, F, area="uniform"), or method="lu"'
+            'use laplacian(V, F, area="uniform"), or method="lu"'
         )
     return method
 

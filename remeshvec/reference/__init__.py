@@ -1,1 +1,1 @@
-"""The input surface as the sweeps look back at it: its curves, its patches, its tree."""
+"""The reference surface of the sweeps, made from the input: its curves, patches and tree."""

@@ -1,6 +1,6 @@
-"""The reference surface: the input as the sweeps look back at it, with its feature curves.
+"""Build the reference surface: the cleaned and cut input with its feature curves.
 
-Here constraints become the arrays that all phases read: kinds of vertices, curves of edges, births.
+Constraints become the arrays that all phases read: kinds of vertices, curves of edges, births.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ __all__ = ["FeaturedReference", "build_reference"]
 
 
 class FeaturedReference(NamedTuple):
-    """The reference, and what the policy needs to know besides."""
+    """The reference, with what the sweeps need to know besides."""
 
     reference: Reference
     on_non_manifold: (
@@ -113,10 +113,10 @@ def build_reference(
 
 
 def _lengthen_beside(mesh: Mesh, vertex_source: IndexArray, frozen: BoolArray) -> None:
-    """Let the target length at the ends of an edge that must not be split reach that of the edge.
+    """Raise the target length at the ends of an edge that must not be split to the edge's length.
 
-    The other edges of its faces cannot all be shorter than half of it: they would be split for ever.
-    In the mesh only: elsewhere the reference says what was asked for.
+    Otherwise the other edges of its faces would be split for ever: they cannot all be shorter than half
+    of it. Only the mesh changes; the reference keeps the lengths that were asked for.
     """
     h = np.flatnonzero(frozen)
     if len(h):
@@ -159,7 +159,7 @@ def _junctions(
 def _agree_across_copies(
     fixed: BoolArray, vertex_source: IndexArray, on_non_manifold: BoolArray
 ) -> BoolArray:
-    """Fix all copies of a vertex on a seam where one is fixed; a copy off all seams stays with them."""
+    """Fix all copies of a vertex on a seam if one is fixed, including a copy off all seams."""
     n = int(vertex_source.max()) + 1
     at_seam = np.zeros(n, np.bool_)
     at_seam[vertex_source[on_non_manifold]] = True
@@ -182,7 +182,7 @@ def _mark(mesh: Mesh, edges: IndexArray, fixed: BoolArray) -> None:
 
 @kernel
 def _mark_curves(mesh, edges):
-    """Let vertices on curves be born on that of their edges which has the smallest name."""
+    """Give each vertex on curves the birth of its edge with the smallest name."""
     for h in edges:
         for v in (mesh.origin[h], mesh.origin[next_halfedge(h)]):
             if mesh.kind[v] != CURVE or mesh.curve[h] < mesh.birth[v]:

@@ -1,9 +1,9 @@
 """Bounding-volume tree over the reference surface, and its closest point with a hint.
 
-The faces come in Morton order, so the tree needs no construction: leaves are runs of faces, every
+The faces come in Morton order, so the tree needs no construction: leaves are runs of faces, and every
 level groups four boxes of the one below. A query walks over the surface from the face found last time
-until no neighbour is closer. That mostly is the closest face, never on another sheet, and far cheaper
-than the search of the whole tree, which takes some tenths of a microsecond even from there.
+until no neighbour is closer. The walk mostly ends at the closest face and never on another sheet. It is
+far cheaper than a search of the whole tree, which takes some tenths of a microsecond even from there.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ WALK_TRUST = 0.05
 # For `search_face`: every face may be found.
 NO_NORMAL = (0.0, 0.0, 0.0)
 
-STACK = 64  # boxes waiting: 3 a level and 16 levels hold 4e9 leaves
+STACK = 64  # boxes waiting: 3 per level; 16 levels hold 4e9 leaves
 
 
 class Surface:
-    """A surface whose patches and tree are found when they are first asked for.
+    """A surface whose patches and tree are built on first use.
 
     Sweeps that do not project need neither.
 
@@ -66,7 +66,7 @@ class Surface:
     twin : (3 m,) int32
         Opposite half-edges, ``NONE`` where a patch ends.
     parallel : bool
-        Whether the parallel kernels may run; may be set anew before the tree is asked for.
+        Whether the parallel kernels may run; can be changed before the tree is first used.
     """
 
     def __init__(self, X: FloatArray, origin: IndexArray, twin: IndexArray, parallel: bool) -> None:
@@ -76,7 +76,7 @@ class Surface:
         self.parallel = parallel
 
     def __getstate__(self) -> dict[str, object]:
-        """Leave the tree out of pickles: it is larger than all else, and soon built."""
+        """Leave the tree out of pickles: it is larger than everything else and quickly built."""
         return {name: value for name, value in vars(self).items() if name != "tree"}
 
     @cached_property
@@ -90,7 +90,7 @@ class Surface:
 
 @kernel
 def _fill_patches(twin, patch):
-    """Give a number to each set of faces that hang together."""
+    """Set the patch of every face: connected faces get the same number."""
     stack = np.empty(patch.size, np.int32)
     count = 0
     for seed in range(patch.size):
@@ -244,9 +244,9 @@ def walk_to_face(tree, p, start):
 def closest_face(tree, p, hint, trust, stack):
     """Face of the hint's patch closest to a point, with weights of its corners 1 and 2.
 
-    The squared distance comes last. Ties go to the face where the walk from the hint ends. What it
-    finds within a squared distance of ``trust`` is taken without a search: 0 for the exact answer,
-    inf for the walk alone. ``stack`` is (2, STACK) int64 scratch: boxes waiting and their levels.
+    The squared distance comes last. Ties go to the face where the walk from the hint ends. If that face
+    is within a squared distance of ``trust``, it is taken without a search: 0 gives the exact answer,
+    inf the walk alone. ``stack`` is (2, STACK) int64 scratch: boxes waiting and their levels.
     """
     face, s, t, distance = walk_to_face(tree, p, hint)
     if distance <= trust:
@@ -258,8 +258,8 @@ def closest_face(tree, p, hint, trust, stack):
 def search_face(tree, p, face, normal, stack):
     """Search the whole patch of a face for the face closest to a point, starting with that face.
 
-    With a normal, faces that look the other way do not count, unless the search started there: on a
-    thin sheet a point does not go to the other side.
+    With a normal, faces that look the other way do not count, unless the search started there. So a
+    point does not jump to the other side of a thin sheet.
     """
     best = face
     s, t, distance = face_distance(tree.corners, face, p)
@@ -306,9 +306,9 @@ def closest_faces(
     ----------
     tree : Tree
     points : (k, 3) float64
-        Best in an order in which neighbours follow each other.
+        Fastest if neighbouring points follow each other.
     hint : (k,) int32
-        Face to start at, whose patch alone is searched; ``NONE``: where the point before ended.
+        Face to start at, and the only patch to search; ``NONE`` starts where the previous point ended.
     trust : float
         A face within this distance is good enough; 0 for the closest.
     parallel : bool
@@ -339,7 +339,7 @@ def closest_points(
 def walk_to(
     tree: Tree, points: FloatArray, start: NDArray[np.integer]
 ) -> tuple[IndexArray, FloatArray, FloatArray]:
-    """Walk from a face to each point as near as walks lead, which cross no curve.
+    """Walk from a face as close to each point as possible without crossing a curve.
 
     Returns
     -------

@@ -13,17 +13,17 @@ from .bvh import ARITY, LEAF, STACK, corner
 
 __all__ = ["crossing_faces"]
 
-# Ends of an edge count as on either side of a plane from this distance on: in the frame of the mesh,
-# what is nearer is rounding.
+# An end of an edge lies on one side of a plane only from this distance on: in the frame of the mesh,
+# smaller distances are rounding errors.
 _APART = 1e-13
 
 
 def crossing_faces(tree: Tree, parallel: bool, adjacent: bool = True) -> IndexArray:
-    """Return the faces that an edge of another face passes through, or whose edges do, in order.
+    """Return the faces that cross another one, in order: an edge of one passes through the other.
 
-    Faces that touch, or lie in one plane, do not cross. Two faces that share a corner cross where they
-    meet elsewhere too [Moeller 1997; here by signed volumes]; without ``adjacent``, only faces that
-    share none are looked at, which is faster.
+    Faces that touch, or lie in one plane, do not cross. Two faces that share a corner cross if they also
+    meet elsewhere [Moeller 1997; here by signed volumes]. Without ``adjacent``, only faces without a
+    common corner are tested, which is faster.
     """
     marks = np.zeros(len(tree.corners), np.uint8)
     _find_crossings(parallel, tree, adjacent, marks)
@@ -44,7 +44,7 @@ def _find_crossings(span, tree, adjacent, marks):
 
 @inlined
 def _mark_crossed(tree, f, adjacent, stack, marks):
-    """Mark a face and the later ones that it crosses, if there are any."""
+    """Mark a face and the later ones that it crosses, if any."""
     low, high = _box_of(tree.corners, f)
     stack[0, 0] = 0
     stack[1, 0] = tree.level.size - 2
@@ -154,7 +154,7 @@ def _pierces(corners, f, g):
 
 @inlined
 def _is_corner(p, a, b, c):
-    """Tell whether a point is one of three, bit for bit: sheets that meet have corners of their own."""
+    """Tell whether a point equals one of three, bit for bit: sheets that meet have separate corners."""
     return (
         (p[0] == a[0] and p[1] == a[1] and p[2] == a[2])
         or (p[0] == b[0] and p[1] == b[1] and p[2] == b[2])

@@ -23,7 +23,7 @@ def find_non_manifold_edges(mesh: Mesh) -> tuple[IndexArray, IndexArray]:
 
 
 def non_manifold_vertices(mesh: Mesh, featured: FeaturedReference) -> IndexArray:
-    """Vertices where sheets meet, those of all sheets."""
+    """All copies of the vertices where sheets meet."""
     if featured.on_non_manifold is None:
         return np.empty(0, np.int32)
     h = np.flatnonzero((mesh.twin == NONE) & (mesh.origin != DEAD))
@@ -34,7 +34,7 @@ def non_manifold_vertices(mesh: Mesh, featured: FeaturedReference) -> IndexArray
 def non_manifold_copies(
     mesh: Mesh, featured: FeaturedReference
 ) -> tuple[IndexArray, IndexArray] | None:
-    """Vertices on seams and a number for the place of each, the same on all sheets; None for none."""
+    """Vertices on seams, and a number per place that is the same on all sheets; None without seams."""
     if featured.on_non_manifold is None:
         return None
     v = non_manifold_vertices(mesh, featured)

@@ -1,4 +1,4 @@
-"""The input surface, as sweeps look back at it."""
+"""The reference surface that the sweeps project onto."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Reference(NamedTuple):
 
     @property
     def tree(self) -> Tree:
-        """The tree over its faces, built when it is first asked for."""
+        """The tree over its faces, built on first use."""
         return self.surface.tree
 
     @property

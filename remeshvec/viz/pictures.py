@@ -1,7 +1,7 @@
 """Pictures of a mesh before and after, with PyVista (the extra ``[viz]``).
 
 `picture` renders to a file without a window, `show` opens a window. Both show the two meshes side by
-side under one camera.
+side with one camera.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ Arrays = tuple[ArrayLike, ArrayLike]  # V (n, 3), F (m, 3)
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 BACKGROUND, FRONT, BACK, EDGE, TEXT = "white", "#d3e3f3", "#ecd5b8", "#1c2a3a", "#1c2a3a"
-# Seen from the side that shows most, turned by a third of a right angle and from a little above: this
-# shows depth and hides hardly any of the silhouette.
+# The view is from the side that shows most, turned by a third of a right angle and slightly from above:
+# this shows depth and hides hardly any of the silhouette.
 TURN, ELEVATION = np.radians(28.0), np.radians(17.0)
-# A surface lower than this share of its largest extent lies like a map and is seen from high above.
+# A surface lower than this share of its largest extent lies flat like a map and is seen from high above.
 FLAT, FLAT_ELEVATION = 0.25, np.radians(50.0)
 UP = {"y": np.eye(3), "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])}  # x, up, front
-VIEW_ANGLE = 20.0  # degrees; a long lens, with which near triangles look hardly larger
+VIEW_ANGLE = 20.0  # degrees; a long lens, so that near triangles hardly look larger
 MARGIN = 1.06
 TITLE_BAND = 0.04  # height of the titles, in widths of the picture
 LOWEST, HIGHEST = 0.25, 0.6  # height of a picture without the titles, in widths
-CLEAR_EDGE, FAINTEST = 11.0, 0.25  # length in pixels of edges drawn in full; least opacity
+CLEAR_EDGE, FAINTEST = 11.0, 0.25  # pixel length of edges drawn fully opaque; least opacity
 
 
 class ViewerMissingError(RemeshvecError, ImportError):
@@ -61,7 +61,7 @@ class Camera(NamedTuple):
 
 
 class CameraFrame(NamedTuple):
-    """The visible part of space: its middle, half its width and height, and the size in pixels."""
+    """The visible part of space: its middle, half width and half height, and the size in pixels."""
 
     middle: FloatArray
     half_width: float
@@ -96,11 +96,11 @@ def picture(
     before, after : ((n, 3) float, (m, 3) int)
         Vertices and faces of the two meshes.
     titles : (str, str)
-        Names above the meshes, in front of their numbers of faces.
+        Titles above the meshes, before their numbers of faces.
     width : int
         Width in pixels; the height follows from the shape of the object.
     up : {"y", "z"}
-        Axis that points up: y in most models of figures, z in most of buildings and machine parts.
+        Axis that points up: y in most models of figures, z in most models of buildings and machine parts.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def show(
 ) -> None:
     """Open a window with two meshes side by side and linked cameras; return when it is closed.
 
-    Parameters are those of `picture`, without the path.
+    Parameters are those of `picture` except the path.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def _plotter(pyvista: Any, scene: PictureScene, *, off_screen: bool) -> Any:
     plotter.set_background(BACKGROUND)
     for k, ((V, F), title) in enumerate(zip(meshes, titles, strict=True)):
         plotter.subplot(0, k)
-        # Graphics cards use float32: scaled points lose no digits to their size or place.
+        # Graphics cards use float32: with scaled points, neither size nor position costs digits.
         points = (V - frame.middle) / frame.half_height
         surface = pyvista.PolyData.from_regular_faces(points, F)
         _add_surface(plotter, surface, _mean_edge(points, F) * frame.pixels[1] / 2)
@@ -246,7 +246,7 @@ def _add_title(plotter: Any, text: str, frame: CameraFrame) -> None:
 
 
 def _aim(plotter: Any, camera: Camera) -> None:
-    """Look at the scaled scene; the picture shows heights from -1 to 1."""
+    """Set the camera on the scaled scene; the picture shows heights from -1 to 1."""
     distance = 1 / np.tan(np.radians(VIEW_ANGLE / 2))
     plotter.camera.focal_point = (0.0, 0.0, 0.0)
     plotter.camera.position = tuple(camera.eye * distance)
@@ -279,7 +279,7 @@ def three_quarter_view(V: ArrayLike, F: ArrayLike, axes: ArrayLike) -> Camera:
     V, F = as_mesh(V, F)
     axes = _as_axes(axes)
     normals = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]) @ axes.T
-    angles = np.radians(sorted(range(-85, 90, 5), key=abs))  # a half circle, its front first
+    angles = np.radians(sorted(range(-85, 90, 5), key=abs))  # half a circle, front first
     sides = np.stack([np.sin(angles), np.zeros_like(angles), np.cos(angles)])
     shown = np.abs(normals @ sides).sum(axis=0)
     best = angles[np.flatnonzero(shown >= (1 - 1e-6) * shown.max())[0]]  # rounding breaks no ties

@@ -1,30 +1,21 @@
-"""`remesh_many`: order, the same bytes, what fails fails alone, nothing is kept, nothing is left."""
+"""`remesh_many`: items in order, the bytes of single calls, and no more in memory than needed."""
 
 from __future__ import annotations
 
 import gc
 import hashlib
 import io
-import os
-import pickle
-import signal
-import subprocess
 import sys
-import threading
-import time
-from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers import zoo
+from helpers.processes import SLEEPS
+from helpers.threads import at_once
 
 from remeshvec import (
-    BatchError,
-    MeshFormatError,
     MeshInputError,
     OptionError,
-    RemeshvecError,
     WorkerError,
     read_mesh,
     remesh,
@@ -33,12 +24,6 @@ from remeshvec import (
 )
 from remeshvec.batch import progress as _progress
 from remeshvec.processes import pool as _workers
-from remeshvec.processes.worker import END_PATIENCE
-
-ROOT = Path(__file__).resolve().parents[2]
-PATIENCE = 60.0
-
-needs_proc = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc")
 
 
 def meshes():
@@ -64,44 +49,6 @@ def digest(result):
         array = getattr(result, name)
         sha.update(f"{name}{array.dtype}{array.shape}".encode() + array.tobytes())
     return sha.hexdigest()
-
-
-class Fatal:
-    """Ends the process that unpickles it, as a crash does."""
-
-    def __init__(self, how, *args):
-        self.call = how, args
-
-    def __reduce__(self):
-        return self.call
-
-
-EXIT, KILLED = Fatal(os._exit, 7), Fatal(signal.raise_signal, getattr(signal, "SIGKILL", 15))
-SLEEPS = Fatal(time.sleep, 10 * PATIENCE)
-
-
-def children():
-    """Worker processes that are alive, and those that nobody has waited for."""
-    return children_of("self")
-
-
-def children_of(pid):
-    found = []
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        with suppress(OSError):  # a thread that has ended
-            found += (task / "children").read_text().split()
-    return found
-
-
-@pytest.fixture
-def no_processes_left():
-    yield
-    if Path("/proc/self/task").exists():
-        assert not children()
-    assert not [t for t in threading.enumerate() if t.name == "remeshvec feeder"]
-
-
-pytestmark = pytest.mark.usefixtures("no_processes_left")
 
 
 # -- results --------------------------------------------------------------------------------------
@@ -159,6 +106,20 @@ def test_as_completed():
     for item in found:
         if item is not slow:
             assert digest(item.result) == digest(remesh(*items[item.index]))
+
+
+def test_calls_at_once():
+    """From several threads, each with workers of its own."""
+
+    def call():
+        return [digest(item.result) for item in remesh_many(meshes(), workers=2)]
+
+    assert at_once(call, call) == 2 * [[digest(remesh(*mesh)) for mesh in meshes()]]
+
+
+def test_what_workers_print_does_not_disturb():
+    found = list(remesh_many([zoo.grid(5, 5)], callback=print, workers=2, on_error="collect"))
+    assert found[0].error is None and len(found[0].result.F) > 0
 
 
 def test_arguments():
@@ -260,177 +221,6 @@ def test_errors_that_are_kept_keep_no_arrays(workers):
     gc.collect()
     assert all(isinstance(item.error, MeshInputError) for item in kept)
     assert not any(array() is not None for array in arrays)
-
-
-# -- what fails -----------------------------------------------------------------------------------
-
-
-def hostile(tmp_path):
-    """Items that fail, with what they fail with."""
-    V, F = zoo.grid(5, 5)
-    (tmp_path / "empty.obj").touch()
-    (tmp_path / "garbage.ply").write_bytes(os.urandom(1000))
-    return [
-        ((V * np.nan, F), MeshInputError),
-        ((V, F + 30), MeshInputError),
-        (tmp_path / "empty.obj", MeshFormatError),
-        (tmp_path / "garbage.ply", MeshFormatError),
-        (tmp_path / "absent.stl", MeshFormatError),
-    ]
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_forty_meshes_with_five_hostile_ones(workers, tmp_path):
-    bad = hostile(tmp_path)
-    items = [zoo.grid(4 + k % 5, 5) for k in range(35)]
-    places = [3, 4, 17, 30, 39]
-    for place, (item, _) in zip(places, bad, strict=True):
-        items.insert(place, item)
-    found = list(remesh_many(items, workers=workers, on_error="collect"))
-    failed = [item for item in found if item.error is not None]
-    assert len(found) == 40 and [item.index for item in failed] == places
-    for item, (given, kind) in zip(failed, bad, strict=True):
-        assert type(item.error) is kind and item.result is None
-        if isinstance(given, Path):
-            assert item.name == str(given) and given.name in str(item.error)
-    assert sum(len(item.result.F) > 0 for item in found if item.error is None) == 35
-
-
-def test_a_length_that_is_too_small():
-    found = list(remesh_many([zoo.grid(4, 4)] * 2, 1e-9, workers=2, on_error="collect"))
-    assert [type(item.error) for item in found] == 2 * [OptionError]
-    assert "max_faces" in str(found[0].error)
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_the_first_failure_names_its_input(workers, tmp_path):
-    path = tmp_path / "absent.obj"
-    items = iter([zoo.grid(5, 5), path, zoo.grid(5, 5), tmp_path / "other.obj"])
-    found = remesh_many(items, workers=workers)
-    assert next(found).index == 0
-    with pytest.raises(BatchError, match=r"item 1 \(.*absent\.obj\) failed: .*no such") as caught:
-        next(found)
-    assert isinstance(caught.value, RemeshvecError)
-    assert (caught.value.index, caught.value.name) == (1, str(path))
-    assert isinstance(caught.value.__cause__, MeshFormatError)
-    again = pickle.loads(pickle.dumps(caught.value))
-    assert (str(again), again.index) == (str(caught.value), 1)
-    assert next(found, None) is None
-
-
-def test_a_worker_that_dies_takes_one_item_with_it():
-    good = zoo.grid(5, 5)
-    items = [good, EXIT, good, KILLED, good, good, EXIT]
-    found = list(remesh_many(items, workers=2, on_error="collect"))
-    assert [item.error is None for item in found] == [item is good for item in items]
-    assert all(isinstance(found[k].error, WorkerError) for k in (1, 3, 6))
-    assert "exit code 7" in str(found[1].error) and "SIGKILL" in str(found[3].error)
-    with pytest.raises(BatchError, match=r"item 1 .*Fatal.*died"):
-        list(remesh_many(items, workers=2))
-
-
-def test_what_cannot_be_sent_fails_alone():
-    good = zoo.grid(5, 5)
-    found = list(remesh_many([good, threading.Lock(), good], workers=2, on_error="collect"))
-    assert [item.error is None for item in found] == [True, False, True]
-    assert "workers=1" in str(found[1].error) and found[1].name == "an object of type lock"
-
-
-def test_unexpected_errors_say_where_they_come_from():
-    class Odd:
-        def __len__(self):
-            raise RuntimeError
-
-    found = list(remesh_many([Odd(), zoo.grid(4, 4)], workers=2, on_error="collect"))
-    assert isinstance(found[0].error, WorkerError) and found[1].error is None
-    found = list(remesh_many([zoo.grid(4, 4)], lambda points: 1 / 0, workers=2, on_error="collect"))
-    assert isinstance(found[0].error, ZeroDivisionError)
-    assert "_remesh_here" in "".join(found[0].error.__notes__)
-
-
-def test_workers_that_cannot_start(monkeypatch):
-    monkeypatch.setattr(_workers, "_START", "import sys; sys.exit(5)")
-    with pytest.raises(WorkerError, match="exit code 5"):
-        list(remesh_many([zoo.grid(4, 4)], workers=2, on_error="collect"))
-
-
-def test_what_workers_print_does_not_disturb():
-    found = list(remesh_many([zoo.grid(5, 5)], callback=print, workers=2, on_error="collect"))
-    assert found[0].error is None and len(found[0].result.F) > 0
-
-
-# -- the end --------------------------------------------------------------------------------------
-
-
-def test_workers_end_when_the_caller_stops_early():
-    start = time.monotonic()
-    for item in remesh_many([zoo.grid(5, 5), *[SLEEPS] * 20], workers=2):
-        assert item.index == 0
-        break
-    assert time.monotonic() - start < 0.5 * PATIENCE
-
-
-def test_calls_at_once():
-    """From several threads, each with workers of its own."""
-    found = {}
-
-    def call(name):
-        found[name] = [digest(i.result) for i in remesh_many(meshes(), workers=2)]
-
-    threads = [threading.Thread(target=call, args=(k,)) for k in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(PATIENCE)
-    assert found[0] == found[1] == [digest(remesh(*mesh)) for mesh in meshes()]
-
-
-SCRIPT = """
-import time
-from remeshvec import remesh_many
-
-class Sleeps:
-    def __reduce__(self):
-        return time.sleep, (600,)
-
-# The first one fails at once, without kernels to be loaded.
-for item in remesh_many(["absent.obj", Sleeps(), Sleeps()], workers=2, on_error="collect"):
-    print(item.index, flush=True)
-"""
-
-
-def alive(pid):
-    """Whether a process is there and no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except OSError:
-        return False
-
-
-@needs_proc
-@pytest.mark.parametrize("kind", ["SIGINT", "SIGTERM", "SIGKILL"])
-def test_no_worker_survives(kind, tmp_path):
-    """A script without a guard, which is ended while its workers work."""
-    (tmp_path / "script.py").write_text(SCRIPT)
-    process = subprocess.Popen(
-        [sys.executable, str(tmp_path / "script.py")],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stdout.readline() == "0\n"
-    workers = children_of(process.pid)
-    assert len(workers) == 2 and all(map(alive, workers))
-    start = time.monotonic()
-    process.send_signal(getattr(signal, kind))
-    _, errors = process.communicate(timeout=PATIENCE)
-    assert time.monotonic() - start < END_PATIENCE
-    deadline = time.monotonic() + PATIENCE
-    while any(map(alive, workers)) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not any(map(alive, workers))
-    assert errors.count("Traceback") == (kind == "SIGINT")
 
 
 # -- progress -------------------------------------------------------------------------------------

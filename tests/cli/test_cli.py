@@ -11,14 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import zoo
+from helpers.processes import surroundings
 
 import remeshvec
 from remeshvec.cli.command import ProgressLine, main
 from remeshvec.errors import OptionError
 from remeshvec.files.mesh_files import SUFFIXES, read_mesh, write_mesh
-
-SAMPLES = Path(__file__).parents[3] / "shared" / "data" / "samples"
-needs_samples = pytest.mark.skipif(not SAMPLES.is_dir(), reason="the samples are not here")
 
 
 def bumpy_sheet(n=12):
@@ -34,19 +33,6 @@ def sheet(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_mesh("in.obj", *bumpy_sheet())
     return "in.obj"
-
-
-@pytest.fixture
-def asked(monkeypatch):
-    """Let the command call the real remesher, and note with what."""
-    calls, real = [], remeshvec.remesh
-
-    def remesh(V, F, L=None, **options):
-        calls.append({"L": L} | options)
-        return real(V, F, L, **options)
-
-    monkeypatch.setattr("remeshvec.remesh", remesh)
-    return calls
 
 
 def failing_remesh(error):
@@ -183,7 +169,7 @@ def test_notices_and_dirt_are_shown(sheet, capsys):
     [
         (["missing.obj"], "cannot read missing.obj: there is no such file"),
         (["broken.obj"], "cannot read broken.obj: 'f 1' is not a face"),
-        (["in.obj", "-o", "out.xyz"], "cannot write out.xyz: the suffix '.xyz' is none of"),
+        (["in.obj", "-o", "out.xyz"], "cannot write out.xyz: the suffix '.xyz' is not one of"),
         (["in.obj", "-o", "none/out.obj"], "cannot write none/out.obj: there is no folder"),
         (["in.obj", "-o", "folder.obj"], "cannot write folder.obj: it is a folder"),
         (["in.obj", "--save-stats", "none/s.json"], "there is no folder"),
@@ -305,11 +291,6 @@ def command(*arguments):
     return [sys.executable, "-m", "remeshvec", *arguments]
 
 
-def surroundings():
-    root = str(Path(__file__).parents[2])
-    return os.environ | {"PYTHONPATH": root}
-
-
 def test_as_a_process_bad_input_gives_one_line_and_status_2(sheet):
     done = subprocess.run(
         command("missing.obj"), env=surroundings(), capture_output=True, text=True, check=False
@@ -336,13 +317,12 @@ def test_as_a_process_a_closed_pipe_gives_no_traceback(sheet):
     assert len(read_mesh("out.obj").F) > 0
 
 
-@needs_samples
 @pytest.mark.parametrize(
     ("name", "dirt"),
     [("sample1.json", "unreferenced vertices: 4,875"), ("cow.obj", None), ("wolf_head.obj", None)],
 )
 def test_real_samples(name, dirt, tmp_path, capsys):
-    assert main([str(SAMPLES / name), "-o", str(tmp_path / "out.ply")]) == 0
+    assert main([str(zoo.sample_path(name)), "-o", str(tmp_path / "out.ply")]) == 0
     out = capsys.readouterr().out
     assert dirt is None or f"note: {dirt}" in out
     assert len(read_mesh(tmp_path / "out.ply").F) > 100

@@ -6,25 +6,16 @@ import numpy as np
 import pytest
 from helpers import zoo
 
-import remeshvec
 from remeshvec import Adaptive, read_mesh, write_mesh
 from remeshvec.cli.command import main
 
 
-@pytest.fixture
-def asked(monkeypatch, tmp_path):
-    """A sheet in a folder of its own; notes what the library was asked for."""
+@pytest.fixture(autouse=True)
+def sheet(tmp_path, monkeypatch):
+    """A sheet in a folder of its own."""
     monkeypatch.chdir(tmp_path)
     V, F = zoo.grid(9, 9)
     write_mesh("in.obj", V / 8, F)
-    calls, real = [], remeshvec.remesh
-
-    def remesh(V, F, L=None, **options):
-        calls.append({"L": L} | options)
-        return real(V, F, L, **options)
-
-    monkeypatch.setattr("remeshvec.remesh", remesh)
-    return calls
 
 
 def save(name, values):

@@ -5,22 +5,20 @@ import itertools
 import sys
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numba
 import numpy as np
 import pytest
 from helpers import no_negative_index, zoo
+from helpers.processes import PATIENCE, eventually
+from helpers.threads import at_once
 
 from remeshvec import remesh
 from remeshvec.core import threads as _threads
 from remeshvec.core.compiler import kernel as Kernel
 from remeshvec.core.compiler.decorators import ThreadedKernel
 
-ROOT = Path(__file__).resolve().parents[2]
 CORES = 4  # as the tests have it, whatever the machine says
-PATIENCE = 60.0  # seconds after which a call hangs
 
 needs_jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="kernels are not compiled")
 
@@ -51,30 +49,6 @@ def helper_threads():
 def digest(result):
     arrays = (result.V, result.F, result.birth_face, result.birth_barycentric)
     return hashlib.sha256(b"".join(np.ascontiguousarray(x).tobytes() for x in arrays)).hexdigest()
-
-
-def at_once(*functions):
-    """Run functions in threads that start together; their results, or the first error."""
-    barrier = threading.Barrier(len(functions))
-
-    def run(function):
-        barrier.wait(PATIENCE)
-        return function()
-
-    executor = ThreadPoolExecutor(len(functions))
-    futures = [executor.submit(run, function) for function in functions]
-    try:
-        return [future.result(PATIENCE) for future in futures]
-    finally:
-        executor.shutdown(wait=False)
-
-
-def eventually(condition):
-    """Wait for what another thread is about to do."""
-    deadline = time.monotonic() + PATIENCE
-    while not condition() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    return condition()
 
 
 # -- the GIL --------------------------------------------------------------------------------------

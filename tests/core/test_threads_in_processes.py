@@ -1,15 +1,12 @@
 """Threads in processes: children of every kind, interrupts, ends, kernels compiled at once."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from core.test_threads import CORES, PATIENCE, at_once, needs_jit
-
-ROOT = Path(__file__).resolve().parents[2]
+from core.test_threads import CORES, needs_jit
+from helpers.processes import PATIENCE, run_python, surroundings
+from helpers.threads import at_once
 
 COMMON = """
 import hashlib, json, multiprocessing, os, sys, threading, time
@@ -37,20 +34,11 @@ def call(_):
 def in_a_process(tmp_path, text, *paths, limit=CORES, **env):
     """Run a script in the root; what it prints last, as JSON."""
     (tmp_path / "script.py").write_text(COMMON + text)
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *map(str, paths)]), **env}
+    env = {**surroundings(*paths), **env}
     env.pop("NUMBA_NUM_THREADS", None)
     if limit:
         env["NUMBA_NUM_THREADS"] = str(limit)
-    done = subprocess.run(
-        [sys.executable, str(tmp_path / "script.py")],
-        env=env,
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    done = run_python(tmp_path / "script.py", env=env, timeout=PATIENCE)
     assert "Traceback" not in done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 

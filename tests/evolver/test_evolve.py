@@ -84,14 +84,17 @@ def test_other_surfaces_are_left_alone(name):
     assert found.n_cuts == 0 and np.array_equal(found.F, F) and np.array_equal(found.V, V)
 
 
+def with_tip(V, F, f, height=1.0):
+    """Join a face to a new vertex, its middle times ``height``."""
+    a, b, c = F[f]
+    k = len(V)
+    F = np.vstack([np.delete(F, f, axis=0), [[a, b, k], [b, c, k], [c, a, k]]])
+    return np.vstack([V, V[[a, b, c]].mean(axis=0) * height]), F
+
+
 def test_small_tips_are_no_necks():
     """A vertex with three faces sits on a cycle of three edges."""
-    V, F = zoo.icosphere(2)
-    f = 7
-    V = np.vstack([V, V[F[f]].mean(axis=0) * 1.1])
-    k = len(V) - 1
-    a, b, c = F[f]
-    F = np.vstack([np.delete(F, f, axis=0), [[a, b, k], [b, c, k], [c, a, k]]])
+    V, F = with_tip(*zoo.icosphere(2), 7, 1.1)
     assert cut_necks(V, F, np.zeros(len(V), bool)).n_cuts == 0
 
 
@@ -99,10 +102,7 @@ def test_flat_patches_are_no_necks():
     """Nine faces inside a triangle: many, but not more area than a cap would have."""
     V, F = zoo.icosphere(2)
     for f in (7, -1, -3, -5):
-        V = np.vstack([V, V[F[f]].mean(axis=0)])
-        k = len(V) - 1
-        a, b, c = F[f]
-        F = np.vstack([np.delete(F, f, axis=0), [[a, b, k], [b, c, k], [c, a, k]]])
+        V, F = with_tip(V, F, f)
     assert cut_necks(V, F, np.zeros(len(V), bool)).n_cuts == 0
 
 

@@ -19,6 +19,8 @@ from helpers.bad_arguments import (
     NOT_TEXTS,
     NOT_WORDS,
     Entry,
+    assert_complete,
+    assert_listed,
     assert_refused,
     called,
     cases,
@@ -27,8 +29,6 @@ from helpers.bad_arguments import (
     not_faces,
     not_numbers,
     not_vertices,
-    parameters,
-    public_methods,
 )
 
 from remeshvec import evolver
@@ -202,15 +202,12 @@ def test_every_public_function_has_an_entry():
         value = getattr(evolver, name)
         if name in RECORDS or (inspect.isclass(value) and issubclass(value, Exception)):
             continue
-        assert value in TABLE, name
-        if inspect.isclass(value):
-            assert set(public_methods(value)) <= set(TABLE), name
+        assert_listed(TABLE, value)
 
 
 @pytest.mark.parametrize("function", TABLE, ids=name_of)
 def test_every_parameter_has_bad_values(function):
-    assert set(TABLE[function].bad) == set(parameters(function))
-    assert all(TABLE[function].bad.values())
+    assert_complete(TABLE, function)
 
 
 @pytest.mark.parametrize("function", TABLE, ids=name_of)

@@ -34,26 +34,6 @@ def places(V, found):
     return sorted(map(tuple, np.round(V[found, :2], 12).tolist()))
 
 
-def polygon(points, spacing):
-    """Flat disc inside a polygon, its sides cut to equal edges of about a spacing."""
-    P = np.array(points, float)
-    rim = []
-    for a, b in zip(P, np.roll(P, -1, axis=0), strict=True):
-        n = max(1, round(np.linalg.norm(b - a) / spacing))
-        rim += [a + (b - a) * i / n for i in range(n)]
-    return fan_of(np.array(rim))
-
-
-def fan_of(rim):
-    middle = [0.7, 0.7] if len(rim) and rim.min() >= 0 else rim.mean(axis=0)
-    V = np.vstack([rim, middle])
-    return np.column_stack([V, np.zeros(len(V))]), zoo.fan(np.arange(len(rim)), len(rim))
-
-
-def disc(n, radius=1.0):
-    return fan_of(radius * cad_parts.regular(n))
-
-
 def line_in_grid(points):
     """Sheet of unit squares, and the edges of a polyline over its vertices, wherever its faces cut."""
     V, F = zoo.arrays(zoo.grid(13, 13)[0], zoo.wrapped_grid(13, 13, False, False))
@@ -136,7 +116,7 @@ def test_links_of_a_closed_crease_run_both_ways():
 def test_a_circle_has_no_corners(n, length):
     if length < 2 * np.pi / n:
         pytest.skip("edges longer than the scale: it is a polygon there")
-    assert len(corners_of(*disc(n), length)) == 0
+    assert len(corners_of(*zoo.disc(n), length)) == 0
 
 
 @pytest.mark.parametrize("length", [0.3, 1.9, 2.5])
@@ -145,21 +125,21 @@ def test_arcs_that_go_on_turning_are_no_corners(length):
     t = np.linspace(-np.pi / 2, np.pi / 2, 41)
     end = np.stack([10 + np.cos(t), np.sin(t)], axis=1)
     side = np.stack([np.linspace(-9.9, 9.9, 200), np.full(200, -1.0)], axis=1)
-    assert len(corners_of(*fan_of(np.vstack([side, end, -side, -end])), length)) == 0
+    assert len(corners_of(*zoo.fan_inside(np.vstack([side, end, -side, -end])), length)) == 0
 
 
 @pytest.mark.parametrize("length", [0.05, 0.3, 1.0, 2.0, 10.0])
 @pytest.mark.parametrize("spacing", [0.04, 0.5, 9.0])
 def test_a_rectangle_has_four(spacing, length):
     points = [[0, 0], [3, 0], [3, 2], [0, 2]]
-    V, F = polygon(points, spacing)
+    V, F = zoo.polygon(points, spacing)
     assert places(V, corners_of(V, F, length)) == sorted(map(tuple, points))
 
 
 @pytest.mark.parametrize("length", [0.05, 0.3, 0.6])
 def test_an_l_has_six(length):
     """Convex and concave corners alike."""
-    V, F = polygon(cad_parts.L_SHAPE, 0.1)
+    V, F = zoo.polygon(cad_parts.L_SHAPE, 0.1)
     assert places(V, corners_of(V, F, length)) == sorted(map(tuple, cad_parts.L_SHAPE.tolist()))
 
 
@@ -171,18 +151,18 @@ def test_a_grid_keeps_its_corners_whatever_the_length():
 
 def test_noise_far_below_the_length_is_no_corner():
     rng = np.random.default_rng(2)
-    V, F = disc(400)
+    V, F = zoo.disc(400)
     V[:-1, :2] *= 1 + 0.004 * rng.random((400, 1))
     assert len(corners_of(V, F, 0.3)) == 0
 
 
 def test_corners_of_several_loops():
-    V, F = zoo.joined(zoo.grid(), disc(40), shift=20.0)
+    V, F = zoo.joined(zoo.grid(), zoo.disc(40), shift=20.0)
     assert len(corners_of(V, F, 0.8)) == 4
 
 
 def test_corners_do_not_depend_on_scale_or_place():
-    V, F = polygon(cad_parts.L_SHAPE, 0.1)
+    V, F = zoo.polygon(cad_parts.L_SHAPE, 0.1)
     expected = corners_of(V, F, 0.3).tolist()
     assert corners_of(8 * V, F, 2.4).tolist() == expected
     assert corners_of(zoo.rotate(V) + 5, F, 0.3).tolist() == expected
@@ -191,7 +171,7 @@ def test_corners_do_not_depend_on_scale_or_place():
 def test_of_close_corners_the_larger_stays():
     """A notch of 0.1 in a side of 2: at a length of 1 one of its four corners, at 0.1 all."""
     notch = [[0, 0], [2, 0], [2, 1], [1.1, 1], [1.1, 0.9], [1, 0.9], [1, 1], [0, 1]]
-    V, F = polygon(notch, 0.02)
+    V, F = zoo.polygon(notch, 0.02)
     assert len(corners_of(V, F, 0.1)) == 8
     found = places(V, corners_of(V, F, 1.0))
     assert {(0, 0), (2, 0), (2, 1), (0, 1)} <= set(found) and len(found) < 8
@@ -199,7 +179,7 @@ def test_of_close_corners_the_larger_stays():
 
 def test_strips_of_any_width_keep_their_ends():
     """Both corners while the strip is wider than L / 2; a single tip where it is narrower."""
-    V, F = polygon([[0, 0], [10, 0], [10, 1], [0, 1]], 0.05)
+    V, F = zoo.polygon([[0, 0], [10, 0], [10, 1], [0, 1]], 0.05)
     for length in np.arange(0.35, 6.0, 0.1):
         found = V[corners_of(V, F, length), 0]
         assert sorted(found) == ([0, 0, 10, 10] if length <= 2 else [0, 10])
@@ -209,19 +189,19 @@ def test_strips_of_any_width_keep_their_ends():
 def test_equal_corners(seed):
     """One reach apart, an eighth of the loop, they all stay; nearer, the smaller index of a pair."""
     rotation = np.random.default_rng(seed).random(3)
-    V, F = polygon([[0, 0], [3, 0], [3, 1], [0, 1]], 1.0)
+    V, F = zoo.polygon([[0, 0], [3, 0], [3, 1], [0, 1]], 1.0)
     assert len(corners_of(zoo.rotate(V, rotation), F, 100.0)) == 4
-    V, F = polygon([[0, 0], [4, 0], [4, 1], [0, 1]], 1.0)
+    V, F = zoo.polygon([[0, 0], [4, 0], [4, 1], [0, 1]], 1.0)
     assert corners_of(zoo.rotate(V, rotation), F, 100.0).tolist() == [0, 4]
 
 
 @pytest.mark.parametrize("angle", [30.0, 50.0, 70.0])
 def test_a_number_is_the_smallest_turn(angle):
     """A hexagon turns by 60 degrees, a square by 90."""
-    assert len(corners_of(*polygon(cad_parts.regular(6), 0.1), 0.3, angle)) == (
+    assert len(corners_of(*zoo.polygon(cad_parts.regular(6), 0.1), 0.3, angle)) == (
         6 if angle < 60 else 0
     )
-    assert len(corners_of(*polygon(cad_parts.regular(4), 0.1), 0.3, angle)) == 4
+    assert len(corners_of(*zoo.polygon(cad_parts.regular(4), 0.1), 0.3, angle)) == 4
 
 
 # --- corners of open curves ----------------------------------------------------------------------
@@ -295,7 +275,7 @@ def test_local_lengths_decide():
     """The same zigzag of half units: corners where the length is fine, none where it is coarse."""
     x = np.arange(0, 40.1, 0.5)
     top = np.stack([x[::-1], 8 + 0.25 * (np.arange(len(x)) % 2)], axis=1)
-    V, F = fan_of(np.vstack([[[0.0, 0.0], [40.0, 0.0]], top]))
+    V, F = zoo.fan_inside(np.vstack([[[0.0, 0.0], [40.0, 0.0]], top]))
     length = np.where(V[:, 0] < 20, 0.1, 6.0)
     found = corners_of(V, F, length, 40.0)
     zigzag = found[V[found, 1] > 7.9]

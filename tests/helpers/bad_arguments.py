@@ -75,7 +75,9 @@ class Entry(NamedTuple):
 
 
 def parameters(function):
-    return [name for name in inspect.signature(function).parameters if name != "self"]
+    """Names that a caller may give; those of ``**options`` are not known."""
+    known = inspect.signature(function).parameters.values()
+    return [one.name for one in known if one.name != "self" and one.kind is not one.VAR_KEYWORD]
 
 
 def public_methods(kind):
@@ -104,12 +106,26 @@ def cases(table):
 
 
 def called(function, arguments):
-    """Call by name, but for what only a position can give."""
+    """Call by name, but for what only a position can give; use up what a generator yields."""
     given = dict(arguments)
     for name, one in inspect.signature(function).parameters.items():
         if one.kind is one.VAR_POSITIONAL:
             return function(given["self"], *given[name])
-    return function(**given)
+    found = function(**given)
+    return list(found) if inspect.isgenerator(found) else found
+
+
+def assert_listed(table, value):
+    """Check that a function, or a class with its public methods, has an entry."""
+    assert value in table
+    if inspect.isclass(value):
+        assert set(public_methods(value)) <= set(table)
+
+
+def assert_complete(table, function):
+    """Check that every parameter of a function has bad values."""
+    assert set(table[function].bad) == set(parameters(function))
+    assert all(table[function].bad.values())
 
 
 def assert_refused(table, function, name, value):

@@ -81,7 +81,7 @@ def curve_edges(mesh: Mesh) -> dict[frozenset[int], int]:
     """Map edges on curves, as pairs of vertices, to their curve."""
     found = {}
     for h in np.flatnonzero((mesh.curve != NONE) & (mesh.origin != DEAD)).tolist():
-        found[frozenset((int(mesh.origin[h]), int(mesh.origin[next_of(h)])))] = int(mesh.curve[h])
+        found[frozenset(ends(mesh, h))] = int(mesh.curve[h])
     return found
 
 
@@ -292,14 +292,14 @@ def assert_on_reference(mesh: Mesh, reference: Reference) -> None:
             here = patch[mesh.birth[v] // 3]
             assert here == patch[mesh.source[h // 3]], f"vertex {v} was born in another patch"
     for h, name in zip(on_curve.tolist(), names.tolist(), strict=True):
-        for v in (mesh.origin[h], mesh.origin[next_of(h)]):
+        for v in ends(mesh, h):
             if mesh.kind[v] == CURVE:
                 assert chain[mesh.birth[v]] == chain[name], f"vertex {v} was born on another curve"
             else:
                 assert mesh.kind[v] == FIXED, f"vertex {v} on a curve"
     frozen = alive[mesh.curve[alive] == FROZEN]
-    ends = mesh.origin[np.concatenate([frozen, [next_of(h) for h in frozen.tolist()]]).astype(int)]
-    assert (mesh.kind[ends] == FIXED).all(), "a frozen edge with an end that may move"
+    frozen_ends = [v for h in frozen for v in ends(mesh, h)]
+    assert (mesh.kind[frozen_ends] == FIXED).all(), "a frozen edge with an end that may move"
 
 
 def chains_of(reference: Reference) -> np.ndarray:
@@ -312,6 +312,16 @@ def chains_of(reference: Reference) -> np.ndarray:
     )
     graph = coo_matrix((np.ones(len(pairs)), pairs.reshape(-1, 2).T), shape=(len(h), len(h)))
     return connected_components(graph, directed=False)[1]
+
+
+def ends(mesh: Mesh, h: int) -> tuple[int, int]:
+    """Vertices that a half-edge joins, its origin first."""
+    return int(mesh.origin[h]), int(mesh.origin[next_of(int(h))])
+
+
+def place(mesh: Mesh, h: int) -> frozenset[tuple]:
+    """Where the ends of an edge lie, whichever way it runs; -0 counts as 0."""
+    return frozenset(tuple((mesh.X[v, :3] + 0.0).tolist()) for v in ends(mesh, h))
 
 
 def next_of(h: int) -> int:

@@ -1,14 +1,33 @@
-"""Run loops over pieces on several threads, or one piece after the other in any order."""
+"""Run functions at the same time, and loops over pieces on several threads or in any order."""
 
 from __future__ import annotations
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from unittest.mock import patch
 
 import numpy as np
 
+from helpers.processes import PATIENCE
 from remeshvec.core import threads as _threads
 from remeshvec.core.compiler import decorators
+
+
+def at_once(*functions) -> list:
+    """Run functions in threads that start together; returns their results, or raises the first error."""
+    barrier = threading.Barrier(len(functions))
+
+    def run(function):
+        barrier.wait(PATIENCE)
+        return function()
+
+    executor = ThreadPoolExecutor(len(functions))
+    futures = [executor.submit(run, function) for function in functions]
+    try:
+        return [future.result(PATIENCE) for future in futures]
+    finally:
+        executor.shutdown(wait=False)
 
 
 @contextmanager

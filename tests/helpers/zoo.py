@@ -26,8 +26,10 @@ from data.shapes.basic import (  # noqa: F401  (so that tests need one import)
     cone,
     cube,
     cylinder,
+    disc,
     duplicate_face,
     fan,
+    fan_inside,
     flat_cap,
     genus_2,
     genus_3,
@@ -42,6 +44,7 @@ from data.shapes.basic import (  # noqa: F401  (so that tests need one import)
     outward,
     pinched_tetrahedra,
     planar_delaunay,
+    polygon,
     repeated_index,
     sliver_fan,
     square,
@@ -143,9 +146,14 @@ DIRTY_SAMPLES = ("sample1.json", "sample2.json", "sample3.json")
 
 def sample(name: str) -> Arrays:
     """Read one of the sample meshes; the test is skipped where they are absent."""
+    return read(sample_path(name))
+
+
+def sample_path(name: str) -> Path:
+    """Return the file of a sample mesh; the test is skipped where it is absent."""
     if not (SAMPLE_FOLDER / name).is_file():
         pytest.skip(f"needs the sample mesh {name}, which is not part of the project")
-    return read(SAMPLE_FOLDER / name)
+    return SAMPLE_FOLDER / name
 
 
 def samples() -> Iterator[tuple[str, np.ndarray, np.ndarray]]:

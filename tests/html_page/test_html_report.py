@@ -262,7 +262,7 @@ def test_the_command_writes_a_page(tmp_path, monkeypatch, capsys):
     text = text_of(Path("a.html").read_text("utf-8"))
     assert f"call remeshvec '{name}' --length 0.5 --html a.html --up z" in text
     for arguments, words in (
-        (["--html", "a.txt"], "none of .html"),
+        (["--html", "a.txt"], "not one of .html"),
         (
             ["-o", "a.obj", "--html", "./a.html", "--save-stats", "a.html"],
             "two outputs have the same name",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from helpers import naive, zoo
-from helpers.structure import built, curve_edges, cut_open, half_edges, next_of
+from helpers.structure import built, curve_edges, cut_open, ends, half_edges
 
 from data.shapes import nonmanifold
 from remeshvec import OptionError
@@ -155,10 +155,9 @@ def marks_of(mesh, source=None, same=None, faces=None, n=None, G=None, **wanted)
     return found.on_mesh(mesh, source, faces, same)
 
 
-def ends(mesh, which):
+def edges_in(mesh, which):
     """Edges of a mask of half-edges, as sets of vertices."""
-    found = np.flatnonzero(which).tolist()
-    return {frozenset((int(mesh.origin[h]), int(mesh.origin[next_of(h)]))) for h in found}
+    return {frozenset(ends(mesh, h)) for h in np.flatnonzero(which)}
 
 
 def test_nothing_marked():
@@ -176,7 +175,7 @@ def test_edges_are_marked_on_both_sides():
     rim = [sorted(e) for e in naive.boundary_edges(F)][:2]
     marks = marks_of(mesh, feature_edges=[e[::-1] for e in inner] + rim)
     assert marks.hard.sum() == 2 * 5 + 2
-    assert ends(mesh, marks.hard) == set(map(frozenset, inner + rim))
+    assert edges_in(mesh, marks.hard) == set(map(frozenset, inner + rim))
 
 
 def test_borders_of_labels_are_marked():
@@ -194,7 +193,7 @@ def test_held_faces_freeze_their_edges_and_fix_their_corners():
     mesh = built(V, F)
     marks = marks_of(mesh, fixed_faces=[5, 17])
     assert np.flatnonzero(marks.held).tolist() == [5, 17]
-    assert ends(mesh, marks.frozen) == naive.edges(F[[5, 17]])
+    assert edges_in(mesh, marks.frozen) == naive.edges(F[[5, 17]])
     for edge in naive.edges(F[[5, 17]]):
         assert marks.frozen[half_edges(mesh, *edge)].all(), "one side is not frozen"
     assert set(np.flatnonzero(marks.fixed).tolist()) == set(F[[5, 17]].ravel().tolist())
@@ -245,7 +244,7 @@ def test_seams_are_no_boundary(mode):
     marks = marks_of(mesh, source, boundary=mode)
     seam = {frozenset(e) for e, faces in zoo.edge_faces(G).items() if len(faces) > 2}
     rim = naive.boundary_edges(G)
-    frozen = {frozenset(source[list(e)].tolist()) for e in ends(mesh, marks.frozen)}
+    frozen = {frozenset(source[list(e)].tolist()) for e in edges_in(mesh, marks.frozen)}
     assert frozen == (rim if mode == "fixed" else set())
     fixed = set(source[marks.fixed].tolist())
     assert fixed == {v for edge in rim for v in edge}
@@ -263,7 +262,7 @@ def test_welded_vertices_stand_for_each_other():
         mesh, same=same, n=N + 2, G=G, fixed_vertices=[N + 1], feature_edges=[[N, other]]
     )
     assert np.flatnonzero(marks.fixed).tolist() == [12]
-    assert ends(mesh, marks.hard) == {frozenset((7, other))}
+    assert edges_in(mesh, marks.hard) == {frozenset((7, other))}
 
 
 def test_vertices_that_no_face_uses_mark_nothing():

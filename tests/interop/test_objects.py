@@ -1,11 +1,12 @@
 """Mesh objects of other libraries go in and come out as what they are, with what they carry."""
 
-import sys
 import warnings
 
 import numpy as np
 import pytest
 from helpers import zoo
+from helpers.loaded_cube import areas, assert_charts
+from helpers.processes import run_python
 
 from data.shapes import textured
 from remeshvec import MeshInputError, OptionError, RemeshResult, remesh, remesh_many
@@ -13,17 +14,6 @@ from remeshvec.interop.mesh_data import split_vertices
 
 V, F, UV = textured.cube(4)
 L = 0.3
-
-
-def areas(uv):
-    a, b = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    return 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-
-
-def assert_charts(uv):
-    """Six charts, as large as before, and no face across two."""
-    assert np.isclose(abs(areas(uv)).sum(), 0.81, rtol=1e-5)
-    assert np.ptp(uv, axis=1).max() < 0.2
 
 
 # --- trimesh ---------------------------------------------------------------------------------
@@ -335,16 +325,14 @@ def test_wrong_calls_are_named(call, error, message):
 
 
 def test_no_library_is_imported_for_arrays():
-    import subprocess
-
     code = (
         "import sys, numpy as np, remeshvec\n"
         "r = remeshvec.remesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], 0.5)\n"
         "r.transfer(np.zeros(3)), r.transfer(np.zeros((1, 3)), on='corners')\n"
         "print(*sys.modules)"
     )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert not {"trimesh", "pyvista", "meshio", "open3d", "torch"} & set(out.stdout.split())
+    loaded = set(run_python("-c", code).stdout.split())
+    assert not {"trimesh", "pyvista", "meshio", "open3d", "torch"} & loaded
 
 
 # --- splitting vertices ----------------------------------------------------------------------

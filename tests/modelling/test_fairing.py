@@ -192,7 +192,7 @@ def test_bad_input():
             fair(V, F, [1, 2], **options)
     with pytest.raises(OptionError, match="region"):
         fair(V, F, [len(V)])
-    with pytest.raises(OptionError, match="no face"):
+    with pytest.raises(OptionError, match="do not belong to a face"):
         fair(np.vstack([V, [[1, 1, 1]]]), F, [len(V)])
     flat = V.copy()
     flat[F[0]] = flat[F[0, 0]]

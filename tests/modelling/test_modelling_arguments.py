@@ -1,6 +1,5 @@
 """Every parameter of Laplacians, solver, fairing, editing and smoothing refuses what cannot work."""
 
-import inspect
 from functools import cache
 
 import numpy as np
@@ -14,6 +13,8 @@ from helpers.bad_arguments import (
     NOT_POSITIVE,
     NOT_WORDS,
     Entry,
+    assert_complete,
+    assert_listed,
     assert_refused,
     called,
     cases,
@@ -22,8 +23,6 @@ from helpers.bad_arguments import (
     not_faces,
     not_numbers,
     not_vertices,
-    parameters,
-    public_methods,
 )
 
 import remeshvec
@@ -133,15 +132,12 @@ def test_every_public_function_has_an_entry():
     for name in remeshvec.__all__:
         value = getattr(remeshvec, name)
         if value.__module__.startswith("remeshvec.modelling.") and name not in RECORDS:
-            assert value in TABLE, name
-            if inspect.isclass(value):
-                assert set(public_methods(value)) <= set(TABLE), name
+            assert_listed(TABLE, value)
 
 
 @pytest.mark.parametrize("function", TABLE, ids=name_of)
 def test_every_parameter_has_bad_values(function):
-    assert set(TABLE[function].bad) == set(parameters(function))
-    assert all(TABLE[function].bad.values())
+    assert_complete(TABLE, function)
 
 
 @pytest.mark.parametrize("function", TABLE, ids=name_of)

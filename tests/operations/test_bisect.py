@@ -13,6 +13,7 @@ from helpers.dead_elements import (
     spotted,
     with_room,
 )
+from helpers.siblings import opened, siblings_of
 from helpers.structure import (
     assert_on_reference,
     assert_same_bits,
@@ -20,10 +21,8 @@ from helpers.structure import (
     built,
     copied,
     curve_edges,
-    cut_open,
     draw,
     faces_of,
-    featured,
     half_edges,
     one_block,
     packed,
@@ -32,8 +31,7 @@ from helpers.structure import (
 from helpers.threads import on_threads, shuffled
 
 from data.shapes import nonmanifold
-from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, FROZEN, HALTED, NON_MANIFOLD, NONE
-from remeshvec.features.polyline import find_siblings
+from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, FROZEN, HALTED, NONE
 from remeshvec.mesh.blocks import make_blocks
 from remeshvec.mesh.walk import ends_of
 from remeshvec.operations import split as module
@@ -230,12 +228,10 @@ def test_faces_that_end_up_behind_are_split_in_the_next_round():
 
 def test_siblings_are_never_split_in_place():
     """All of a group must be, whatever room their blocks have."""
-    mesh, source = cut_open(*nonmanifold.COMPLEXES["two_cubes"].make())
-    featured(mesh, 1.0, vertex_source=source, feature_angle=40.0)
+    mesh, _ = opened(*nonmanifold.COMPLEXES["two_cubes"].make(), 1.0, feature_angle=40.0)
     mesh = with_room(mesh, 500, 500)
     mesh.X[:, 3] = 2 * longest_edge(mesh.X[:, :3], faces_of(mesh))
-    h = np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).astype(np.int32)
-    siblings = find_siblings(mesh.X, mesh.origin, h)
+    siblings = siblings_of(mesh)
     mesh.X[ends_of(mesh.origin, siblings[0][:1]), 3] = 0.1
     flags = classify_edges(mesh, one_block(mesh), 1.0, 0.0, False)
     assert 0 < 2 * flags.n_long <= flags.n_gone and 16 * flags.n_long <= len(flags.mask)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from helpers import naive, zoo
-from helpers.structure import assert_same_bits, blocks_of, built, copied, next_of, one_block
+from helpers.structure import assert_same_bits, blocks_of, built, copied, ends, one_block
 
 from remeshvec.core.vocabulary import DEAD, FROZEN, HALTED, NON_MANIFOLD, NONE
 from remeshvec.operations.classify import REMOVED, classify_edges, is_short
@@ -74,7 +74,7 @@ def test_both_faces_agree_on_what_is_short(name):
     mesh = uneven(name)
     inner = np.flatnonzero((mesh.origin != DEAD) & (mesh.twin != NONE))
     for h in inner[::5].tolist():
-        t, a, b = int(mesh.twin[h]), mesh.origin[h], mesh.origin[next_of(h)]
+        t, (a, b) = int(mesh.twin[h]), ends(mesh, h)
         squared = ((mesh.X[a, :3] - mesh.X[b, :3]) ** 2).sum()
         s, u = mesh.X[[a, b], 3]
         limit = np.sqrt(squared) * (s + u) / (2 * s * u)
@@ -99,7 +99,8 @@ def test_edges_without_length():
     flags = classify_edges(mesh, one_block(mesh), 1e-9, 1e-9, False)
     V = mesh.X[:, :3]
     for h in range(len(mesh.origin)):
-        empty = (V[mesh.origin[h]] == V[mesh.origin[next_of(h)]]).all()
+        a, b = ends(mesh, h)
+        empty = (V[a] == V[b]).all()
         assert flags.mask[h // 3] >> (3 + h % 3) & 1 == empty
         assert not (flags.mask[h // 3] >> (h % 3) & 1 and empty)
 

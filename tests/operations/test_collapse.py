@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers import naive, zoo
+from helpers.collapses import LOOSE, survivor_of
 from helpers.structure import (
     assert_same_bits,
     assert_valid,
@@ -17,7 +18,7 @@ from helpers.structure import (
 
 from data.shapes import topology
 from remeshvec.core.vocabulary import CURVE, DEAD, FIXED, HELD, INNER
-from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
+from remeshvec.operations.collapse import collapse_short_edges
 from remeshvec.operations.guards import keeps_curves
 from remeshvec.operations.outcomes import (
     COLLAPSED,
@@ -32,10 +33,7 @@ from remeshvec.operations.rings import RING_CAPACITY
 
 
 def limits(shortest, **changes):
-    loose = CollapseLimits(
-        shortest=shortest, longest=1e9, foldover_cosine=0.0, quadric_reach=0.0, sliver_check=False
-    )
-    return loose._replace(**changes)
+    return LOOSE._replace(shortest=shortest, **changes)
 
 
 def outcomes(mesh, shortest, **changes):
@@ -78,7 +76,7 @@ def test_each_single_collapse_is_that_of_the_twin(name):
             refused += 1
             continue
         taken += 1
-        survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+        survivor = survivor_of(mesh, a, b)
         removed = a + b - survivor
         expected = naive.collapse(F, survivor, removed)
         assert topology_of(faces_of(mesh)) == topology_of(expected)

@@ -1,10 +1,9 @@
-"""Collapses on and beside curves: what may vanish, what is left of the curves, siblings all or none."""
-
-from itertools import pairwise
+"""Collapses on and beside curves: what may vanish, and what is left of the curves."""
 
 import numpy as np
 import pytest
 from helpers import naive, zoo
+from helpers.collapses import LOOSE, survivor_of
 from helpers.structure import (
     assert_on_reference,
     assert_same_bits,
@@ -13,7 +12,6 @@ from helpers.structure import (
     built,
     copied,
     curve_edges,
-    cut_open,
     draw,
     faces_of,
     featured,
@@ -23,7 +21,6 @@ from helpers.structure import (
     shape_of,
 )
 
-from data.shapes import nonmanifold
 from remeshvec.core.vocabulary import (
     CURVE,
     DEAD,
@@ -36,17 +33,10 @@ from remeshvec.core.vocabulary import (
     NONE,
     PINNED,
 )
-from remeshvec.features.polyline import find_siblings
 from remeshvec.operations.collapse import (
-    CollapseLimits,
     collapse_short_edges,
 )
 from remeshvec.operations.outcomes import COLLAPSED, KEPT_CURVE
-from remeshvec.operations.siblings import collapse_siblings
-
-LOOSE = CollapseLimits(
-    shortest=2e-3, longest=1e9, foldover_cosine=0.0, quadric_reach=0.0, sliver_check=False
-)
 
 
 def pulled(mesh, a, b, length=1e-3):
@@ -126,7 +116,8 @@ def test_every_edge_in_turn():
         if not tally[COLLAPSED]:
             assert_same_bits(mesh, before)
             continue
-        survivor, removed = (a, b) if mesh.vertex_halfedge[b] == DEAD else (b, a)
+        survivor = survivor_of(mesh, a, b)
+        removed = a + b - survivor
         assert before.kind[survivor] >= before.kind[removed]
         assert mesh.kind[survivor] == before.kind[survivor]
         if before.kind[survivor] > before.kind[removed]:
@@ -158,7 +149,7 @@ def test_a_curve_vertex_never_leaves_its_curve():
     pulled(mesh, a, b)
     middle = (mesh.X[a, :3] + mesh.X[b, :3]) / 2
     assert collapse(mesh)[COLLAPSED] == 1
-    survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+    survivor = survivor_of(mesh, a, b)
     assert np.array_equal(mesh.X[survivor, :3], middle) and mesh.kind[survivor] == CURVE
 
 
@@ -170,7 +161,7 @@ def test_quadric_points_are_for_inner_vertices():
     pulled(mesh, a, b)
     middle = (mesh.X[a, :3] + mesh.X[b, :3]) / 2
     assert collapse(mesh, LOOSE._replace(quadric_reach=3.0))[COLLAPSED] == 1
-    survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+    survivor = survivor_of(mesh, a, b)
     assert np.array_equal(mesh.X[survivor, :3], middle)
 
 
@@ -222,7 +213,7 @@ def test_the_flag_of_either_vanished_edge_is_on_both_sides_of_the_new(which, fla
         mesh.kind[[end, apex]] = FIXED
     pulled(mesh, a, b)
     assert collapse(mesh)[COLLAPSED] == 1
-    survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+    survivor = survivor_of(mesh, a, b)
     joined = half_edge(mesh, survivor, apex)
     assert mesh.curve[joined] == mesh.curve[mesh.twin[joined]] == flag
     assert np.isin(mesh.curve[(mesh.origin != DEAD) & (mesh.twin != NONE)], [NONE, flag]).all()
@@ -236,7 +227,7 @@ def test_births_of_merged_vertices_are_the_smaller_edge():
         mesh.birth[[a, b]] = births
         pulled(mesh, a, b)
         assert collapse(mesh)[COLLAPSED] == 1
-        survivor = a if mesh.vertex_halfedge[a] != DEAD else b
+        survivor = survivor_of(mesh, a, b)
         assert mesh.birth[survivor] == 11
     mesh = crossed()
     corner, other = at(4, 3), at(5, 3)
@@ -253,7 +244,7 @@ def test_lengths_are_those_of_the_place():
         mesh.X[[a, b], 3] = [1.0, 2.0]
         pulled(mesh, a, b)
         assert collapse(mesh)[COLLAPSED] == 1
-        assert mesh.X[a if mesh.vertex_halfedge[a] != DEAD else b, 3] == expected
+        assert mesh.X[survivor_of(mesh, a, b), 3] == expected
 
 
 def test_what_is_short_depends_on_the_lengths_at_the_ends():
@@ -329,144 +320,3 @@ def graph(mesh, corners):
             left -= beside
             todo += beside
     return sorted(ends), closed
-
-
-# --- siblings ------------------------------------------------------------------------------------
-
-
-def seams(mesh):
-    h = np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).astype(np.int32)
-    return find_siblings(mesh.X, mesh.origin, h)
-
-
-def sheets_at_places(mesh):
-    """Number of half-edges of every edge on a seam, by its place."""
-    found = {}
-    for h in np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).tolist():
-        edge = frozenset(tuple(mesh.X[v, :3]) for v in (mesh.origin[h], mesh.origin[next_of(h)]))
-        found[edge] = found.get(edge, 0) + 1
-    return found
-
-
-def opened(make, length, **features):
-    mesh, source = cut_open(*make())
-    return mesh, featured(mesh, length, vertex_source=source, **features).reference
-
-
-@pytest.mark.parametrize("name", nonmanifold.COMPLEXES)
-def test_seams_collapse_on_all_sheets(name):
-    make = nonmanifold.COMPLEXES[name].make
-    if name == "wall_inside":  # its ends are near everything
-        make = lambda: nonmanifold.wall_inside(8)  # noqa: E731
-    mesh, reference = opened(make, 100.0, feature_angle=40.0)
-    before = sheets_at_places(mesh)
-    limits = LOOSE._replace(shortest=1.0)
-    total = 0
-    for _ in range(6):
-        members, group = seams(mesh)
-        done = collapse_siblings(mesh, members, group, limits)
-        total += done
-        assert_valid(mesh, slits=True)
-        assert_on_reference(mesh, reference)
-        after = sheets_at_places(mesh)
-        assert min(after.values()) > 1
-        assert sum(after.values()) <= sum(before.values()) - 2 * done
-        collapse_short_edges(mesh, one_block(mesh), limits, False)
-        assert_valid(mesh, slits=True)
-        assert sheets_at_places(mesh) == after, "seams are none of its business"
-    assert total > 0
-    # A curve of k sheets is still one of k sheets: siblings vanished together.
-    assert set(sheets_at_places(mesh).values()) == set(before.values())
-
-
-def test_one_sheet_that_refuses_keeps_all():
-    """On one page a neighbour lies so near that its faces would fold over."""
-    mesh, _ = opened(nonmanifold.book, 0.01)
-    members, group = seams(mesh)
-    groups = [members[i:j] for i, j in pairwise(group)]
-    (pages,) = (one for one in groups if middle(mesh, one[0])[2] == pytest.approx(0.5))
-    limits = LOOSE._replace(shortest=100.0)
-    only = np.array([0, len(pages)], np.int32)
-    free = copied(mesh)
-    assert len(pages) == 5 and collapse_siblings(free, pages, only, limits) == 1
-    assert_valid(free, slits=True)
-    for h in pages.tolist():
-        spoilt = copied(mesh)
-        a, b = int(spoilt.origin[h]), int(spoilt.origin[next_of(h)])
-        F = faces_of(spoilt)
-        beside = next(set(f) - {a} for f in F.tolist() if a in f and b not in f)
-        v = next(v for v in beside if spoilt.kind[v] == INNER)
-        # Past the line through the new place and the third corner.
-        w = (beside - {v}).pop()
-        spoilt.X[v, :3] = spoilt.X[a, :3] + 0.3 * (middle(spoilt, h) - spoilt.X[a, :3])
-        spoilt.X[v, :3] += 1e-3 * (spoilt.X[w, :3] - spoilt.X[a, :3])
-        before = copied(spoilt)
-        assert collapse_siblings(spoilt, pages, only, limits) == 0
-        assert_same_bits(spoilt, before)
-
-
-def middle(mesh, h):
-    return mesh.X[[mesh.origin[h], mesh.origin[next_of(int(h))]], :3].mean(axis=0)
-
-
-def test_long_siblings_stay():
-    mesh, _ = opened(nonmanifold.book, 0.01)
-    before = copied(mesh)
-    assert collapse_siblings(mesh, *seams(mesh), LOOSE._replace(shortest=1.0)) == 0
-    assert_same_bits(mesh, before)
-
-
-def slit_tube(n, m=6):
-    """Tube of n around, cut along a line: both sides of the cut are siblings on the same sheet."""
-    V, _ = zoo.cylinder(n, m)
-    mesh = built(np.vstack([V, V[:m]]), zoo.wrapped_grid(n + 1, m, False, False))
-    ends = mesh.origin, mesh.origin.reshape(-1, 3)[:, [1, 2, 0]].ravel()
-    cut = (mesh.twin == NONE) & (ends[0] % (n * m) < m) & (ends[1] % (n * m) < m)
-    members, group = find_siblings(mesh.X, mesh.origin, np.flatnonzero(cut).astype(np.int32))
-    assert np.array_equal(group, np.arange(0, 2 * m, 2))
-    mesh.curve[members] += NON_MANIFOLD
-    return mesh, members, group
-
-
-@pytest.mark.parametrize("n", [2, 3, 4, 8])
-def test_siblings_whose_rings_overlap_stay(n):
-    """The first collapse would change what was asked about the second."""
-    mesh, members, group = slit_tube(n)
-    inner = [k for k in range(len(group) - 1) if is_inner(mesh, members[group[k]])]
-    k = inner[0]
-    pair, only = members[group[k] : group[k + 1]], np.array([0, 2], np.int32)
-    rings = [ring(mesh, h) for h in pair]
-    before = copied(mesh)
-    done = collapse_siblings(mesh, pair, only, LOOSE._replace(shortest=100.0))
-    assert done == (not rings[0] & rings[1])
-    if not done:
-        assert_same_bits(mesh, before)
-    assert_valid(mesh, slits=True)
-    assert done == (n > 2)
-
-
-def is_inner(mesh, h):
-    """Whether an edge of the cut does not touch the rims."""
-    z = mesh.X[[mesh.origin[h], mesh.origin[next_of(int(h))]], 2]
-    return z.min() > 0 and z.max() < 2
-
-
-def ring(mesh, h):
-    """Vertices of all faces at both ends of an edge."""
-    F = faces_of(mesh)
-    ends = [mesh.origin[h], mesh.origin[next_of(int(h))]]
-    return set(F[np.isin(F, ends).any(axis=1)].ravel().tolist())
-
-
-def test_groups_with_a_removed_member_stay():
-    """A group may have lost an edge to the group before it."""
-    mesh, members, _ = slit_tube(8)
-    mesh.origin[members[0] // 3 * 3 : members[0] // 3 * 3 + 3] = DEAD
-    before = copied(mesh)
-    assert (
-        collapse_siblings(
-            mesh, members[:2], np.array([0, 2], np.int32), LOOSE._replace(shortest=100.0)
-        )
-        == 0
-    )
-    assert_same_bits(mesh, before)

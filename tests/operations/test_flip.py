@@ -11,6 +11,7 @@ from helpers.structure import (
     copied,
     curve_edges,
     draw,
+    ends,
     faces_of,
     half_edge,
     one_block,
@@ -42,10 +43,6 @@ STRICT = FlipLimits(np.cos(np.radians(45)), True, False)
 def inner_pairs(mesh):
     """Both half-edges of every inner edge."""
     return [(h, int(t)) for h, t in enumerate(mesh.twin) if t != NONE and t < h]
-
-
-def ends(mesh, h):
-    return int(mesh.origin[h]), int(mesh.origin[h - 2 if h % 3 == 2 else h + 1])
 
 
 @pytest.mark.parametrize("name", ["torus", "planar_delaunay", "genus_2", "annulus", "l_prism"])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers import naive, zoo
+from helpers.collapses import LOOSE
 from helpers.structure import (
     assert_same_bits,
     assert_valid,
@@ -29,7 +30,7 @@ MESHES = [
 
 
 def limits(longest, reach=0.0):
-    return CollapseLimits(2e-3, longest, 0.0, reach, False)
+    return LOOSE._replace(longest=longest, quadric_reach=reach)
 
 
 def with_short_edge(name, a, b, seed=0):

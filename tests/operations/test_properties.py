@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers import zoo
+from helpers.siblings import sheets_at_places, siblings_of
 from helpers.structure import (
     assert_on_reference,
     assert_same_bits,
@@ -11,7 +12,6 @@ from helpers.structure import (
     faces_of,
     featured,
     locate,
-    next_of,
     project,
     shape_of,
 )
@@ -21,8 +21,7 @@ from hypothesis import strategies as st
 
 from data.shapes import topology
 from remeshvec import remesh
-from remeshvec.core.vocabulary import DEAD, FIXED, NON_MANIFOLD
-from remeshvec.features.polyline import find_siblings
+from remeshvec.core.vocabulary import DEAD, FIXED
 from remeshvec.input.prepare import prepare
 from remeshvec.mesh.blocks import make_blocks
 from remeshvec.operations.classify import classify_edges
@@ -124,7 +123,7 @@ class Phases:
         self.reference = self.built.reference
         self.shape = None if self.slits else shape_of(faces_of(mesh))
         self.corners = held(mesh)
-        self.sheets = set(self.seams().values())
+        self.sheets = set(sheets_at_places(self.mesh).values())
         self.before = mesh.X.copy()
         self.limits = CollapseLimits(
             options["collapse"],
@@ -154,21 +153,12 @@ class Phases:
             if not self.slits:
                 assert shape_of(faces_of(self.mesh)) == self.shape
             assert held(self.mesh) == self.corners, "a fixed vertex moved or went"
-            assert set(self.seams().values()) <= self.sheets, "a seam came open"
+            assert set(sheets_at_places(self.mesh).values()) <= self.sheets, "a sheet came off"
             size = len(self.reference.origin)
             used = self.mesh.vertex_halfedge >= 0
             assert self.mesh.birth[used].min() >= 0 and self.mesh.birth[used].max() < size
         except AssertionError as error:
             raise AssertionError(f"after {phase}: {error}") from error
-
-    def seams(self):
-        """Number of sheets at every edge on a seam, by its place."""
-        found = {}
-        for h in on_seams(self.mesh).tolist():
-            ends = self.mesh.origin[[h, next_of(h)]]
-            edge = frozenset((self.mesh.X[v, :3] + 0.0).tobytes() for v in ends)
-            found[edge] = found.get(edge, 0) + 1
-        return found
 
     def split(self):
         """Rounds, whose flags stay true of a mesh that is split in place."""
@@ -179,7 +169,7 @@ class Phases:
                 return
 
     def one_round(self, mesh, parallel):
-        siblings = find_siblings(mesh.X, mesh.origin, on_seams(mesh)) if self.slits else None
+        siblings = siblings_of(mesh) if self.slits else None
         longest, shortest = self.o["split"], self.o["collapse"]
         flags = classify_edges(mesh, self.blocks, longest, shortest, parallel)
         refined, _ = split_long_edges(mesh, self.blocks, longest, parallel, siblings, flags)
@@ -191,7 +181,7 @@ class Phases:
     def collapse(self):
         self.run("collapse", self.collapse_once)
         if self.slits:
-            siblings = find_siblings(self.mesh.X, self.mesh.origin, on_seams(self.mesh))
+            siblings = siblings_of(self.mesh)
             self.run("siblings", lambda m, p: void(collapse_siblings(m, *siblings, self.limits)))
 
     def collapse_once(self, mesh, parallel):
@@ -248,10 +238,6 @@ class Phases:
 
 def void(_):
     """Return nothing, for phases that count."""
-
-
-def on_seams(mesh):
-    return np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).astype(np.int32)
 
 
 def held(mesh):
@@ -332,8 +318,8 @@ def sheets(F):
     return {len(users) for users in zoo.edge_faces(F).values()} - {1, 2}
 
 
-def assert_proper(result, F):
-    """Whole faces, each once; edges of three faces and more where the input has such, and no others."""
+def assert_proper(result, F, is_tidy=False):
+    """Whole faces, each once; non-manifold edges as in the input; the topology of a tidy mesh."""
     shape = shape_of(result.F)
     assert np.isfinite(result.V).all()
     assert shape["proper"] and shape["duplicate faces"] == 0
@@ -342,18 +328,23 @@ def assert_proper(result, F):
     assert sheets(result.F) == sheets(once)
     if not sheets(once) and "inconsistent_edges" not in result.report.dirt:
         assert shape["oriented"] and shape["manifold"]
+    if is_tidy:
+        assert shape == shape_of(F)
+
+
+def made(mesh):
+    """A perturbed mesh, and the length asked for."""
+    V, F = zoo.ZOO[mesh["name"]].make()
+    length = mesh["factor"] * zoo.mean_edge(V, F)
+    return *zoo.perturb(V, F, mesh["amount"], mesh["seed"]), length
 
 
 @given(MESHES, CALLS)
 @example({"name": "bipyramid", "amount": 0.0, "seed": 0, "factor": 4.0}, {})
 def test_every_call_returns_a_proper_mesh(mesh, call):
-    V, F = zoo.ZOO[mesh["name"]].make()
-    length = mesh["factor"] * zoo.mean_edge(V, F)
-    V, F = zoo.perturb(V, F, mesh["amount"], mesh["seed"])
+    V, F, length = made(mesh)
     result = remesh(V, F, length, **call)
-    assert_proper(result, F)
-    if zoo.ZOO[mesh["name"]].is_tidy:
-        assert shape_of(result.F) == shape_of(F)
+    assert_proper(result, F, zoo.ZOO[mesh["name"]].is_tidy)
     again = remesh(V, F, length, **call)
     assert again.V.tobytes() == result.V.tobytes() and np.array_equal(again.F, result.F)
 
@@ -361,9 +352,7 @@ def test_every_call_returns_a_proper_mesh(mesh, call):
 @given(MESHES, CONTROLS)
 def test_every_controlled_call_returns_a_proper_mesh(mesh, controls):
     """With parts of all kinds that are to be kept, and a length at every vertex."""
-    V, F = zoo.ZOO[mesh["name"]].make()
-    L = mesh["factor"] * zoo.mean_edge(V, F)
-    V, F = zoo.perturb(V, F, mesh["amount"], mesh["seed"])
+    V, F, L = made(mesh)
     used = np.array(topology.proper(F))
     kept = wishes(used, controls)
     for name in ("fixed_faces", "face_labels"):  # in terms of the faces that are whole
@@ -372,9 +361,7 @@ def test_every_controlled_call_returns_a_proper_mesh(mesh, controls):
     if controls["varies"]:
         L = L * (1 + 0.5 * np.sin(3 * V[:, 0] + V[:, 1]))
     result = remesh(V, F, L, **kept)
-    assert_proper(result, F)
-    if zoo.ZOO[mesh["name"]].is_tidy:
-        assert shape_of(result.F) == shape_of(F)
+    assert_proper(result, F, zoo.ZOO[mesh["name"]].is_tidy)
     claimed = np.flatnonzero(result.vertex_map >= 0)
     assert np.array_equal(result.V[result.vertex_map[claimed]], V[claimed])
     if "fixed_vertices" in kept:

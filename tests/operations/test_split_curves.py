@@ -5,27 +5,27 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from helpers import naive, zoo
+from helpers.siblings import opened, sheets_at_places, sibling_ends, siblings_of
 from helpers.structure import (
     assert_on_reference,
     assert_valid,
     blocks_of,
     built,
     curve_edges,
-    cut_open,
     draw,
+    ends,
     faces_of,
     featured,
     half_edge,
-    next_of,
     one_block,
     packed,
+    place,
     shape_of,
 )
 
 from data.shapes import nonmanifold
 from remeshvec.core.vocabulary import (
     CURVE,
-    DEAD,
     FIXED,
     FROZEN,
     HALTED,
@@ -35,7 +35,6 @@ from remeshvec.core.vocabulary import (
     NONE,
     PINNED,
 )
-from remeshvec.features.polyline import find_siblings
 from remeshvec.operations.split import MAX_ROUNDS, compact, split_edges, split_long_edges
 
 ROWS = 5  # vertices of a column of `zoo.grid()`, which has 7 of them
@@ -160,7 +159,7 @@ def test_frozen_edges_are_never_split(factor, flag):
     for h in frozen:
         mesh.curve[h] = flag
         mesh.curve[mesh.twin[h]] = flag
-        mesh.kind[[mesh.origin[h], mesh.origin[next_of(h)]]] = FIXED
+        mesh.kind[list(ends(mesh, h))] = FIXED
     places = {place(mesh, h) for h in frozen}
     refined, count = split(mesh, factor)
     assert count
@@ -168,15 +167,9 @@ def test_frozen_edges_are_never_split(factor, flag):
     still = np.flatnonzero(refined.curve == flag)
     assert len(still) == 2 * len(frozen) and {place(refined, h) for h in still} == places
     # All others are as they would be: faces are high enough to have all their long edges split.
-    frozen = {frozenset((int(mesh.origin[h]), int(mesh.origin[next_of(h)]))) for h in frozen}
+    frozen = {frozenset(ends(mesh, h)) for h in frozen}
     V, F = mesh.X[:, :3], faces_of(mesh)
     assert count == len(naive.asked_splits(V, F, factor) - frozen) < len(naive.edges(F))
-
-
-def place(mesh, h):
-    return frozenset(
-        tuple(mesh.X[v, :3].tolist()) for v in (mesh.origin[h], mesh.origin[next_of(h)])
-    )
 
 
 def test_a_low_face_beside_a_frozen_edge_splits_its_longest_other_one():
@@ -208,9 +201,7 @@ def test_rounds_end_beside_frozen_edges():
 def test_told_to_any_edge_is_split():
     mesh = crossed()
     edges = np.array([half_edge(mesh, 9, 10), half_edge(mesh, 27, 35)], np.int32)
-    middles = {
-        tuple(sum(mesh.X[[mesh.origin[h], mesh.origin[next_of(int(h))]], :3]) / 2) for h in edges
-    }
+    middles = {tuple(sum(mesh.X[list(ends(mesh, h)), :3]) / 2) for h in edges}
     refined = split_edges(mesh, one_block(mesh), edges, False)
     assert_valid(refined)
     new = set(map(tuple, refined.X[:, :3].tolist())) - set(map(tuple, mesh.X[:, :3].tolist()))
@@ -219,11 +210,6 @@ def test_told_to_any_edge_is_split():
 
 
 # --- siblings ------------------------------------------------------------------------------------
-
-
-def seams(mesh):
-    h = np.flatnonzero((mesh.curve >= NON_MANIFOLD) & (mesh.origin != DEAD)).astype(np.int32)
-    return find_siblings(mesh.X, mesh.origin, h)
 
 
 def two_sheets(reach=0.1):
@@ -245,7 +231,7 @@ def test_siblings_are_split_together():
     assert_valid(refined, slits=True)
     middle = np.flatnonzero((refined.X[:, :3] == [1, 0, 0]).all(axis=1))
     assert len(middle) == 2 and (refined.kind[middle] == CURVE).all()
-    assert (refined.curve >= NON_MANIFOLD).sum() == 4 and len(seams(refined)[0]) == 4
+    assert (refined.curve >= NON_MANIFOLD).sum() == 4 and len(siblings_of(refined)[0]) == 4
 
 
 def test_siblings_that_nobody_wants_split_stay():
@@ -260,10 +246,9 @@ def test_siblings_that_nobody_wants_split_stay():
 def test_seams_stay_closed(name, factor):
     """All sheets have the same points on a seam, bit by bit, and are on the same curves."""
     known = nonmanifold.COMPLEXES[name]
-    mesh, source = cut_open(*known.make())
-    built_ = featured(mesh, factor * known.size, vertex_source=source, feature_angle=40.0)
+    mesh, reference = opened(*known.make(), factor * known.size, feature_angle=40.0)
     sheets = sheets_at_places(mesh)
-    mesh = rounds(mesh, 1.2, seams)
+    mesh = rounds(mesh, 1.2, siblings_of)
     found = sheets_at_places(mesh)
     assert len(found) > len(sheets) or factor > 0.2
     lengths = dict.fromkeys(sheets.values(), 0.0)
@@ -272,7 +257,7 @@ def test_seams_stay_closed(name, factor):
     for count in lengths:
         old = sum(np.linalg.norm(np.subtract(*edge)) for edge, k in sheets.items() if k == count)
         assert lengths[count] == pytest.approx(old, rel=1e-9)
-    members, group = seams(mesh)
+    members, group = siblings_of(mesh)
     for i, j in pairwise(group):
         assert len(set((mesh.curve[members[i:j]]).tolist())) == 1
         for end in range(2):
@@ -281,22 +266,7 @@ def test_seams_stay_closed(name, factor):
                 len({(int(mesh.kind[v]), int(mesh.birth[v]), mesh.X[v, 3]) for v in at}) == 1
                 or (mesh.kind[at] == FIXED).all()
             )
-    assert_on_reference(mesh, built_.reference)
-
-
-def sibling_ends(mesh, h):
-    """Ends in the order of their places."""
-    return sorted((mesh.origin[h], mesh.origin[next_of(h)]), key=lambda v: mesh.X[v, :3].tolist())
-
-
-def sheets_at_places(mesh):
-    """Number of half-edges of every edge on a seam, by its place."""
-    found = {}
-    for h in np.flatnonzero(mesh.curve >= NON_MANIFOLD).tolist():
-        edge = tuple(tuple(mesh.X[v, :3].tolist()) for v in sibling_ends(mesh, h))
-        found[edge] = found.get(edge, 0) + 1
-    assert min(found.values()) > 1, "a seam came open"
-    return found
+    assert_on_reference(mesh, reference)
 
 
 # --- births --------------------------------------------------------------------------------------

@@ -94,14 +94,20 @@ def test_two_triangles_with_a_fixed_rim():
 # --- each mode on all open meshes ----------------------------------------------------------------
 
 
+def remeshed(name, factor, boundary):
+    """Remesh an open mesh; its topology must stay. Returns V, F, the length and the result."""
+    V, F = OPEN[name]()
+    L = factor * zoo.mean_edge(V, F)
+    result = remesh(V, F, L, boundary=boundary)
+    assert_clean(*result)
+    assert shape(result.F) == shape(F)
+    return V, F, L, result
+
+
 @pytest.mark.parametrize("factor", [0.4, 1.0, 2.5])
 @pytest.mark.parametrize("name", OPEN)
 def test_free_slides_along_the_boundary(name, factor):
-    V, F = OPEN[name]()
-    L = factor * zoo.mean_edge(V, F)
-    result = remesh(V, F, L, boundary="free")
-    assert_clean(*result)
-    assert shape(result.F) == shape(F)
+    V, F, L, result = remeshed(name, factor, "free")
     size = diagonal(V)
     rim = result.V[np.unique(boundary_edges(result.F))]
     assert to_segments(rim, segments_of(V, F)).max() < ON * size
@@ -112,11 +118,7 @@ def test_free_slides_along_the_boundary(name, factor):
 @pytest.mark.parametrize("factor", [0.4, 1.0, 2.5])
 @pytest.mark.parametrize("name", OPEN)
 def test_split_keeps_every_boundary_vertex(name, factor):
-    V, F = OPEN[name]()
-    L = factor * zoo.mean_edge(V, F)
-    result = remesh(V, F, L, boundary="split")
-    assert_clean(*result)
-    assert shape(result.F) == shape(F)
+    V, F, L, result = remeshed(name, factor, "split")
     given, edges = np.unique(boundary_edges(F)), boundary_edges(result.F)
     found = np.unique(edges)
     assert set(bits(V[given])) <= set(bits(result.V[found]))
@@ -137,10 +139,7 @@ def test_split_keeps_every_boundary_vertex(name, factor):
 @pytest.mark.parametrize("factor", [0.4, 1.0, 2.5])
 @pytest.mark.parametrize("name", OPEN)
 def test_fixed_leaves_the_boundary(name, factor):
-    V, F = OPEN[name]()
-    result = remesh(V, F, factor * zoo.mean_edge(V, F), boundary="fixed")
-    assert_clean(*result)
-    assert shape(result.F) == shape(F)
+    V, F, _, result = remeshed(name, factor, "fixed")
     assert same_on_boundary(result, (V, F))
     given = np.unique(boundary_edges(F))
     assert bits(result.V[result.vertex_map[given]]) == bits(V[given])

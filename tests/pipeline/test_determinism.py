@@ -1,16 +1,14 @@
 """The same bits on any number of threads, and whatever the order in which they take the blocks."""
 
 import json
-import os
-import subprocess
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from helpers import zoo
 from helpers.no_negative_index import all_modules
+from helpers.processes import run_python, surroundings
 from helpers.structure import (
     assert_same_bits,
     assert_valid,
@@ -45,8 +43,6 @@ from remeshvec.reference.bvh import Surface, closest_faces
 from remeshvec.reference.crossings import crossing_faces
 from remeshvec.sizing.target_lengths import mesh_size
 from remeshvec.sweeps.guard import tree_of
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def mesh():
@@ -270,12 +266,8 @@ print(json.dumps(seen))
 def digests(tmp_path, V, F, L, per_block=100, threshold=0, **options):
     np.savez(tmp_path / "mesh.npz", V=V, F=F, L=L)
     case = json.dumps([str(tmp_path / "mesh.npz"), per_block, threshold, options])
-    env = {**os.environ, "NUMBA_NUM_THREADS": "4", "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, case], env=env, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    env = surroundings() | {"NUMBA_NUM_THREADS": "4"}
+    return json.loads(run_python("-c", SCRIPT, case, env=env).stdout)
 
 
 def assert_identical(seen):

@@ -5,12 +5,10 @@ import os
 from pathlib import Path
 
 import numpy as np
-import pytest
 from helpers import zoo
+from helpers.processes import needs_proc
 
 from remeshvec import Adaptive, RemeshvecError, remesh
-
-needs_proc = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc")
 
 
 def resident():

@@ -1,10 +1,12 @@
 """A process that stays for the next call, and is replaced when it dies or takes too long."""
 
 import os
-import threading
 import time
+from functools import partial
 
 import pytest
+from helpers.processes import eventually
+from helpers.threads import at_once
 
 from remeshvec.errors import WorkerError
 from remeshvec.processes.pool import StandingWorker
@@ -46,26 +48,15 @@ def test_a_process_that_dies_or_hangs_is_replaced(worker):
 def test_an_idle_process_leaves(worker, monkeypatch):
     monkeypatch.setattr("remeshvec.processes.pool._IDLE", 0.01)
     pid, _ = worker(1, 10)
-    deadline = time.monotonic() + 5
-    while worker._pool is not None and time.monotonic() < deadline:
-        time.sleep(0.01)
+    assert eventually(lambda: worker._pool is None)
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
     assert worker(1, 10)[0] != pid
 
 
 def test_threads_take_turns(worker):
-    found = {}
-
-    def ask(k):
-        found[k] = worker(k, 10)[1]
-
-    threads = [threading.Thread(target=ask, args=[k]) for k in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert found == {k: k for k in range(8)}
+    found = at_once(*[partial(worker, k, 10) for k in range(8)])
+    assert [task for _, task in found] == list(range(8))
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks here")

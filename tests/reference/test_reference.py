@@ -9,6 +9,7 @@ from helpers.structure import (
     built,
     curve_edges,
     cut_open,
+    ends,
     featured,
     half_edge,
     next_of,
@@ -69,7 +70,7 @@ def assert_built(mesh, result):
     )
     for v in np.flatnonzero(mesh.kind == CURVE):  # or a copy of it, on another sheet
         h = int(mesh.birth[v])
-        places = reference.X[[mesh.origin[h], mesh.origin[next_of(h)]], :3]
+        places = reference.X[list(ends(mesh, h)), :3]
         assert (places == mesh.X[v, :3]).all(axis=1).any()
         assert mesh.birth[v] == mesh.curve[h] & (NON_MANIFOLD - 1), (
             "born on an edge that is no name"

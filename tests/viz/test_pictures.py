@@ -102,7 +102,7 @@ def test_camera_sees_the_broad_side_from_the_front():
 
 
 def test_unknown_suffix_is_refused(pyvista, tmp_path):
-    with pytest.raises(MeshFormatError, match=r"none of \.png"):
+    with pytest.raises(MeshFormatError, match=r"not one of \.png"):
         viz.picture(tmp_path / "a.gif", TETRAHEDRON, TETRAHEDRON)
     assert os.listdir(tmp_path) == []
 
