@@ -6,6 +6,7 @@ is too long any more, has classified the mesh that the collapses start from.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,10 @@ from ..mesh.walk import corners_of
 __all__ = ["REMOVED", "EdgeFlags", "classify_edges", "edge_flags", "is_short"]
 
 REMOVED = 255  # flags of a removed face
+
+# Twice the logarithmic mean of s and t is s + t less so many times (sqrt(s) - sqrt(t))^2, to 1 % where
+# they differ by a factor of 10. So many edges fit where lengths grow evenly from one end to the other.
+_TO_LOGARITHMIC = 2.0 / 3.0
 
 
 class EdgeFlags(NamedTuple):
@@ -51,7 +56,7 @@ def classify_edges(
 ) -> EdgeFlags:
     """Compare all edges with two limits, given as factors of the target lengths at their ends.
 
-    An edge is too long above the arithmetic mean of both lengths, too short below the harmonic mean.
+    An edge is too long above the logarithmic mean of both lengths, too short below the harmonic mean.
     Where lengths jump, the gap between the two means stops splits and collapses from alternating.
     """
     mask = np.empty(mesh.origin.size // 3, np.uint8)
@@ -92,6 +97,11 @@ def edge_flags(mesh, f, half_longest, twice_shortest):
     m0 = half_longest * (s + t)
     m1 = half_longest * (t + u)
     m2 = half_longest * (u + s)
+    if s != t or t != u:
+        p, q, r = sqrt(s), sqrt(t), sqrt(u)
+        m0 -= half_longest * _TO_LOGARITHMIC * (p - q) * (p - q)
+        m1 -= half_longest * _TO_LOGARITHMIC * (q - r) * (q - r)
+        m2 -= half_longest * _TO_LOGARITHMIC * (r - p) * (r - p)
     short = 8 * _is_below(l0, s, t, twice_shortest)
     short |= 16 * _is_below(l1, t, u, twice_shortest)
     short |= 32 * _is_below(l2, u, s, twice_shortest)

@@ -78,10 +78,17 @@ def locate_vertices(
     return barycentric
 
 
-def read_lengths(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> None:
-    """Read the target length of every vertex that may move from the reference where it lies."""
+def read_lengths(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: bool) -> FloatArray:
+    """Read the target length of every vertex that may move from the reference where it lies.
+
+    Returns
+    -------
+    barycentric : (n, 3) float64
+        As `locate_vertices`.
+    """
     weights = locate_vertices(mesh, blocks, reference, np.inf, parallel)
     _read_lengths(parallel, mesh, blocks, reference.polylines, weights)
+    return weights
 
 
 @threaded(per_block)

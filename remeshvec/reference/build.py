@@ -31,6 +31,7 @@ from ..features.tips import LEAST_TURN, hold_tips
 from ..input.constraints import ConstraintMasks
 from ..mesh.walk import ends_of, next_halfedge
 from .bvh import Surface
+from .long_rims import LongRims, lengthen_rims
 from .surface import Reference
 
 __all__ = ["FeaturedReference", "build_reference"]
@@ -44,6 +45,7 @@ class FeaturedReference(NamedTuple):
         BoolArray | None
     )  # (n,) vertices of the reference where sheets meet; None for none
     held: BoolArray | None  # (m,) faces of the reference that stay; None for none
+    long_rims: LongRims | None  # edges that must stay and are longer than asked for; None for none
     features: IndexArray  # half-edges of the reference on features
     names: IndexArray  # of their edges, see `polyline.name_edges`
     counts: dict[str, int]  # of features
@@ -106,26 +108,10 @@ def build_reference(
         twin[_walls(twin, marks.held)] = NONE
     twin[curves.edges] = NONE
     reference = Reference(Surface(X, origin, twin, parallel), X, origin, curve_neighbours, arcs)
-    _lengthen_beside(mesh, vertex_source, marks.frozen)
+    long_rims = lengthen_rims(mesh, vertex_source, marks.frozen)
     return FeaturedReference(
-        reference, on_non_manifold, marks.held, curves.edges, feature_names, counts
+        reference, on_non_manifold, marks.held, long_rims, curves.edges, feature_names, counts
     )
-
-
-def _lengthen_beside(mesh: Mesh, vertex_source: IndexArray, frozen: BoolArray) -> None:
-    """Raise the target length at the ends of an edge that must not be split to the edge's length.
-
-    Otherwise the other edges of its faces would be split for ever: they cannot all be shorter than half
-    of it. Only the mesh changes; the reference keeps the lengths that were asked for.
-    """
-    h = np.flatnonzero(frozen)
-    if len(h):
-        a, b = ends_of(mesh.origin, h)
-        length = np.linalg.norm(mesh.X[a, :3] - mesh.X[b, :3], axis=1)
-        longest = np.zeros(int(vertex_source.max()) + 1)  # the same on all sheets
-        np.maximum.at(longest, vertex_source[a], length)
-        np.maximum.at(longest, vertex_source[b], length)
-        np.maximum(mesh.X[:, 3], longest[vertex_source], out=mesh.X[:, 3])
 
 
 def _walls(twin: IndexArray, held: BoolArray) -> IntArray:

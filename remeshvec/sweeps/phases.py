@@ -155,7 +155,10 @@ def project(work: Work, sweep: Sweep) -> None:
     if work.featured.has_curves and work.before is not None:
         undo_folds(mesh, blocks, work.before, work.is_parallel)
     if work.varies:
-        read_lengths(mesh, blocks, reference, work.is_parallel)
+        weights = read_lengths(mesh, blocks, reference, work.is_parallel)
+        if work.featured.long_rims is not None:
+            corners = reference.origin.reshape(-1, 3)[mesh.birth // 3]
+            work.featured.long_rims.lengthen(mesh, corners, weights)
         bound_gradation(mesh, work.plan.gradation, non_manifold_copies(mesh, work.featured))
     if work.measures_steps and work.before is not None:
         work.step = _mean_step(mesh, work.before)

@@ -71,7 +71,7 @@ class Work:
         self.keeps_numbers = False
         self.is_calm = False
         self.was_guarded = False
-        self.varies = bool(np.ptp(mesh.X[:, 3]) > 0.0)
+        self.varies = bool(np.ptp(mesh.X[:, 3]) > 0.0) or featured.long_rims is not None
 
     def put(self, mesh: Mesh) -> None:
         """Go on with another mesh, of which no edge flags are known."""

@@ -33,6 +33,11 @@ def freeze_some(mesh, seed=0):
                 mesh.curve[mesh.twin[h]] = flag
 
 
+def middle_length(s, t):
+    """Close to the logarithmic mean."""
+    return (0.5 * (s + t) + 2 * np.sqrt(s * t)) / 3
+
+
 def naive_flags(mesh, f, longest, shortest):
     """Bits of one face, from lengths in plain numbers."""
     V, lengths, corners = mesh.X[:, :3], mesh.X[:, 3], mesh.origin[3 * f : 3 * f + 3]
@@ -41,13 +46,30 @@ def naive_flags(mesh, f, longest, shortest):
         a, b = corners[i], corners[(i + 1) % 3]
         length, s, t = naive.edge_length(V, (a, b)), lengths[a], lengths[b]
         bits |= 8 * (length < shortest * 2 / (1 / s + 1 / t)) << i
-        if length > longest * (s + t) / 2 and mesh.curve[3 * f + i] not in (FROZEN, HALTED):
+        if length > longest * middle_length(s, t) and mesh.curve[3 * f + i] not in (FROZEN, HALTED):
             long[i] = length
     if len(long) > 1:
         height = np.linalg.norm(naive.normal(V, corners)) / max(long.values())
-        if height < 0.5 * longest * lengths[corners].mean():
+        around = [middle_length(*lengths[[corners[i], corners[i - 1]]]) for i in range(3)]
+        if height < 0.5 * longest * np.mean(around):
             long = {max(long, key=long.get)}
     return bits | sum(1 << i for i in long)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 2.0, 10.0])
+def test_edges_are_too_long_where_two_would_fit_between_growing_lengths(ratio):
+    """Lengths grow evenly along an edge; the edges that fit are the integral of their inverse."""
+    share = (np.arange(10_000) + 0.5) / 10_000
+    fit = np.mean(1 / (1 + (ratio - 1) * share))
+    for long in (False, True):
+        length = (1.01 if long else 0.99) * 1.2 / fit
+        V = np.array([[0.0, 0, 0], [length, 0, 0], [length / 2, length, 0]])
+        mesh = built(V, [[0, 1, 2]], length=np.array([1.0, ratio, 100.0]))
+        flags = classify_edges(mesh, one_block(mesh), 1.2, 0.1, False)
+        at = int(
+            np.flatnonzero((mesh.X[mesh.origin, 3] + np.roll(mesh.X[mesh.origin, 3], -1)) < 50)
+        )
+        assert bool(flags.mask[0] >> at & 1) == long
 
 
 @pytest.mark.parametrize("per_block", [8, 10**6])

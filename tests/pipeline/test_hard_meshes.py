@@ -74,3 +74,29 @@ def test_cones_keep_their_tips(height):
     assert not result.report.defects.folds.size
     at_tip = result.V[result.F[(result.V[result.F] == V[24]).all(axis=2).any(axis=1)]]
     assert 3 <= len(at_tip) <= 5
+
+
+SQUARE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float), [(0, 1, 2), (0, 2, 3)]
+
+
+@pytest.mark.parametrize(("L", "least"), [(0.1, 10), (0.03, 8)])
+def test_inside_long_rims_faces_come_to_the_length(L, least):
+    """The sides stay; a square of two faces came back as it was."""
+    result = remesh(*SQUARE, L, boundary="fixed")
+    edges = result.V[result.F] - result.V[result.F[:, [1, 2, 0]]]
+    inside = np.abs(result.V[result.F].mean(axis=1)[:, :2] - 0.5).max(axis=1) < 0.15
+    assert inside.any()
+    assert np.median(np.linalg.norm(edges, axis=2)[inside]) < 1.35 * L
+    assert result.report.quality_after.min_angle > least
+    assert zoo.area(*result) == pytest.approx(1.0)
+
+
+def test_a_narrow_face_that_stays_does_not_coarsen_its_surroundings():
+    """Its long edges ask for long ones along themselves only, not around a tube."""
+    t, i = 2 * np.pi * np.arange(48) / 48, np.arange(48)
+    j, P = (i + 1) % 48, np.c_[np.cos(t), np.sin(t)]
+    V = np.vstack([np.c_[P, 0 * t], np.c_[P, 0 * t + 20.0]])
+    F = np.vstack([np.c_[i, j, j + 48], np.c_[i, j + 48, i + 48]])
+    result = remesh(V, F, 0.5, fixed_faces=[7])
+    assert zoo.area(*result) > 0.99 * zoo.area(V, F)
+    assert 1000 < len(result.F) < 3000
