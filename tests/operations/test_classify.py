@@ -66,9 +66,8 @@ def test_edges_are_too_long_where_two_would_fit_between_growing_lengths(ratio):
         V = np.array([[0.0, 0, 0], [length, 0, 0], [length / 2, length, 0]])
         mesh = built(V, [[0, 1, 2]], length=np.array([1.0, ratio, 100.0]))
         flags = classify_edges(mesh, one_block(mesh), 1.2, 0.1, False)
-        at = int(
-            np.flatnonzero((mesh.X[mesh.origin, 3] + np.roll(mesh.X[mesh.origin, 3], -1)) < 50)
-        )
+        lengths = mesh.X[mesh.origin, 3]
+        at = np.flatnonzero(lengths + np.roll(lengths, -1) < 50).item()
         assert bool(flags.mask[0] >> at & 1) == long
 
 
