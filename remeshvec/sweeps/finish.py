@@ -1,4 +1,4 @@
-"""After the last sweep: project once more, untangle, fit, and refine what a tolerance asks for."""
+"""After the last sweep: even out, project, untangle, fit, and refine what a tolerance asks for."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from .deviation import DeviationCheck, edges_to_refine
 from .flaws import count_new_flaws
 from .guard import Guard
 from .plan import Adaptation
+from .rounds import even_out
 from .sheets import separate_sheets
 from .work import Work
 
@@ -45,7 +46,7 @@ def has_finish(work: Work) -> bool:
     """Tell whether `finish` has something to do."""
     plan = work.plan
     recipe = plan.recipe
-    moves = recipe.project or recipe.untangle_rounds or recipe.fit_rounds
+    moves = recipe.project or recipe.rounds or recipe.untangle_rounds or recipe.fit_rounds
     is_bounded = recipe.max_deviation is not None or plan.adaptation is not None
     return bool(moves or is_bounded or work.varies or work.featured.on_non_manifold is not None)
 
@@ -55,6 +56,8 @@ def finish(work: Work, guard: Guard) -> None:
     watch = work.monitor.watch
     with watch.time("extract"):
         work.compact()
+    even_out(work, guard)
+    with watch.time("extract"):
         _let_go(work)
         if work.featured.on_non_manifold is not None:
             work.put(separate_sheets(work.mesh, work.featured))

@@ -28,7 +28,7 @@ from ..sizing.target_lengths import bound_gradation
 from .plan import Sweep
 from .work import Work
 
-__all__ = ["collapse", "flip", "project", "relax", "split"]
+__all__ = ["collapse", "flip", "project", "refresh_lengths", "relax", "split"]
 
 Phase = Callable[[Work, Sweep], None]
 
@@ -154,12 +154,18 @@ def project(work: Work, sweep: Sweep) -> None:
         project_vertices(mesh, blocks, reference, WALK_TRUST, work.is_parallel)
     if work.featured.has_curves and work.before is not None:
         undo_folds(mesh, blocks, work.before, work.is_parallel)
-    if work.varies:
-        read_lengths(mesh, blocks, reference, work.is_parallel)
-        bound_gradation(mesh, work.plan.gradation, non_manifold_copies(mesh, work.featured))
+    refresh_lengths(work)
     if work.measures_steps and work.before is not None:
         work.step = _mean_step(mesh, work.before)
     work.before = None
+
+
+def refresh_lengths(work: Work) -> None:
+    """Read target lengths from the input where vertices lie now, if they vary."""
+    if work.varies:
+        read_lengths(work.mesh, work.blocks, work.featured.reference, work.is_parallel)
+        copies = non_manifold_copies(work.mesh, work.featured)
+        bound_gradation(work.mesh, work.plan.gradation, copies)
 
 
 def _mean_step(mesh: Mesh, before: FloatArray) -> float:
