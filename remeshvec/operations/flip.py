@@ -26,8 +26,16 @@ from ..mesh.blocks import (
     vertex_range,
 )
 from ..mesh.edge_curves import is_feature
-from ..mesh.walk import apex_of, corners_of, end_of, next_halfedge, next_spoke
+from ..mesh.walk import (
+    apex_of,
+    corners_of,
+    end_of,
+    next_halfedge,
+    next_spoke,
+    previous_halfedge,
+)
 from .flip_gains import dot_opposite, is_good_trade, quad_of, valence_gain, violates_delaunay
+from .folds import is_folded
 from .outcomes import (
     FLIPPED,
     KEPT_DUPLICATE,
@@ -227,7 +235,7 @@ def _flip_edge(mesh, h, owned, limits, touched):
         return NO_LONGER_WANTED
     if duplicates_edge(mesh, c, d):
         return KEPT_DUPLICATE
-    if bends_quad(mesh, h, t, limits.normal_cosine):
+    if bends_quad(mesh, h, t, limits.normal_cosine) or folds_neighbour(mesh, h, t):
         return KEPT_NORMAL
     if limits.sliver_check and flip_makes_sliver(mesh, h, t):
         return KEPT_SLIVER
@@ -276,6 +284,35 @@ def bends_quad(mesh, h, t, cosine):
         if mesh.kind[b] >= CURVE and is_flat(wx, wy, wz, new):
             return True
     return turn_exceeds(u, mean, cosine) or turn_exceeds(w, mean, cosine)
+
+
+@inlined
+def folds_neighbour(mesh, h, t):
+    """Guard: a new face would be folded onto a face beside the quad, which is not so now.
+
+    On a rough ridge the quad's own normals agree within the limit, and yet trades made most of the folds
+    that a call made.
+    """
+    a, b, c, d = quad_of(mesh, h, t)
+    old_h, old_t = area_vector(mesh.X, a, b, c), area_vector(mesh.X, b, a, d)
+    new_a, new_b = area_vector(mesh.X, a, d, c), area_vector(mesh.X, b, c, d)
+    return (
+        _folds_beside(mesh, previous_halfedge(h), old_h, new_a)
+        or _folds_beside(mesh, next_halfedge(h), old_h, new_b)
+        or _folds_beside(mesh, next_halfedge(t), old_t, new_a)
+        or _folds_beside(mesh, previous_halfedge(t), old_t, new_b)
+    )
+
+
+@inlined
+def _folds_beside(mesh, h, old, new):
+    """Tell whether the face across a half-edge would be folded by a new normal on this side."""
+    g = mesh.twin[h]
+    if g == NONE:
+        return False
+    a, b, c = corners_of(mesh.origin, g // 3)
+    across = area_vector(mesh.X, a, b, c)
+    return is_folded(across, new) and not is_folded(across, old)
 
 
 @inlined

@@ -11,7 +11,7 @@ from ..operations.fit import fit_vertices
 from ..operations.flip import FlipLimits, flip_edges
 from ..operations.project import project_vertices
 from ..operations.split import split_edges
-from ..operations.unfold import undo_folds
+from ..operations.unfold import undo_folded_edges, undo_folds
 from ..operations.untangle import approach_vertices, untangle_vertices
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_copies
@@ -81,8 +81,8 @@ def polish(work: Work) -> None:
     """Move vertices for the last time: onto the input, out of bad triangles, to a closer fit."""
     mesh, blocks, recipe = work.mesh, work.blocks, work.plan.recipe
     reference, parallel = work.featured.reference, work.is_parallel
+    before = mesh.X.copy()
     if recipe.project:
-        before = mesh.X.copy()
         project_vertices(mesh, blocks, reference, WALK_TRUST, parallel)
         undo_folds(mesh, blocks, before, parallel)
     if recipe.untangle_rounds:
@@ -98,6 +98,7 @@ def polish(work: Work) -> None:
         )
     for _ in range(recipe.fit_rounds):
         fit_vertices(mesh, blocks, reference.tree, _FIT_REACH, parallel)
+    undo_folded_edges(mesh, blocks, before, parallel)
 
 
 def refine(work: Work) -> None:

@@ -21,7 +21,7 @@ from ..operations.relax import relax_vertices
 from ..operations.siblings import collapse_siblings
 from ..operations.slide import slide_vertices
 from ..operations.split import MAX_ROUNDS, SPARE, split_long_edges
-from ..operations.unfold import undo_folds
+from ..operations.unfold import undo_folded_edges, undo_folds
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import find_non_manifold_edges, non_manifold_copies
 from ..sizing.target_lengths import bound_gradation
@@ -140,7 +140,7 @@ def flip(work: Work, sweep: Sweep) -> None:
 def relax(work: Work, sweep: Sweep) -> None:
     """Move vertices in their tangent planes, and those on curves along them."""
     mesh, blocks, reference = work.mesh, work.blocks, work.featured.reference
-    work.before = mesh.X.copy() if work.featured.has_curves or work.measures_steps else None
+    work.before = mesh.X.copy()
     for _ in range(sweep.relaxations):
         slide_vertices(mesh, blocks, reference, work.is_parallel)
         relax_vertices(mesh, blocks, sweep.stiffness, work.is_parallel)
@@ -154,6 +154,7 @@ def project(work: Work, sweep: Sweep) -> None:
         project_vertices(mesh, blocks, reference, WALK_TRUST, work.is_parallel)
     if work.featured.has_curves and work.before is not None:
         undo_folds(mesh, blocks, work.before, work.is_parallel)
+    undo_folded_edges(mesh, blocks, work.before, work.is_parallel)
     refresh_lengths(work)
     if work.measures_steps and work.before is not None:
         work.step = _mean_step(mesh, work.before)

@@ -12,7 +12,7 @@ from ..operations.frames import FRAME_SIZE, measure_frames
 from ..operations.lloyd import Pace, run_lloyd_round
 from ..operations.project import project_vertices
 from ..operations.slide import slide_vertices
-from ..operations.unfold import undo_folds
+from ..operations.unfold import undo_folded_edges, undo_folds
 from ..reference.bvh import WALK_TRUST
 from .guard import Guard
 from .phases import refresh_lengths
@@ -85,5 +85,8 @@ def _project(work: Work) -> None:
 
 def _unfold(work: Work, before: FloatArray, velocity: FloatArray) -> None:
     """Take back moves that fold, and stop the vertices that made them."""
-    if undo_folds(work.mesh, work.blocks, before, work.is_parallel):
-        velocity[(work.mesh.X[:, :3] == before[:, :3]).all(axis=1)] = 0.0
+    mesh, blocks = work.mesh, work.blocks
+    count = undo_folds(mesh, blocks, before, work.is_parallel)
+    count += undo_folded_edges(mesh, blocks, before, work.is_parallel)
+    if count:
+        velocity[(mesh.X[:, :3] == before[:, :3]).all(axis=1)] = 0.0
