@@ -34,12 +34,12 @@ class Recipe:
     delaunay_ties: bool = True  # flips that keep valence restore Delaunay
     flip_passes: int = 2
     stiffness: float = 60.0  # hold of curved ridges on their vertices while relaxing
-    last_relaxations: int = 1  # relaxations in the last sweep, one before
+    last_relaxations: int = 0  # relaxations in the last sweep, one before
     project: bool = True
     projected_sweeps: int = 8  # the last sweeps, which project
-    rounds: int = 24  # Lloyd rounds after the sweeps
-    round_gain: float = 1.2  # share of the way to the centroid that a round adds to the velocity
-    round_momentum: float = 0.9  # share of the velocity that stays
+    rounds: int = 20  # Lloyd rounds after the sweeps
+    round_gain: float = 3.0  # share of the way to the centroid that a round adds to the velocity
+    round_momentum: float = 0.85  # share of the velocity that stays
     trade_angle: float = 25.0  # degrees by which opposite angles outweigh a step of valence
     untangle_rounds: int = 4
     untangle_angle: float = 43.8  # degrees; triangles below it are untangled
@@ -61,7 +61,7 @@ class Recipe:
 # the last digits are worth nothing.
 _DEFAULT = Recipe(
     preset="default",
-    iterations=10,
+    iterations=8,
     collapse=(0.9, 0.9, 0.88, 0.87, 0.86, 0.84, 0.82, 0.8),
     split=(1.25, 1.25, 1.27, 1.28, 1.29, 1.3, 1.32, 4 / 3),
 )
@@ -77,6 +77,7 @@ PRESETS: dict[str, Recipe] = {
         delaunay_ties=False,
         flip_passes=1,
         stiffness=0.0,
+        last_relaxations=1,
         rounds=0,
         untangle_rounds=0,
     ),

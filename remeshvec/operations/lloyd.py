@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.compiler import add_four, inlined, threaded
+from ..core.compiler import add_moment, inlined, threaded
 from ..core.vocabulary import DEAD, Blocks, FloatArray, Mesh
 from ..mesh.blocks import (
     DONE,
@@ -137,14 +137,11 @@ def _add_cells(X, a, b, c, varies, sums):
         ca *= _density(lc, la, lb)
         cb *= _density(lc, lb, la)
     s = ab + ac
-    p, q = 0.5 * ab + s * gb, 0.5 * ac + s * gc
-    add_four(sums, a, 0, p * wx - q * vx, p * wy - q * vy, p * wz - q * vz, s)
+    add_moment(sums, a, X, (a, b, c), 0.5 * ab + s * gb, 0.5 * ac + s * gc, s)
     s = bc + ba
-    p, q = 0.5 * bc + s * gc, 0.5 * ba + s * ga
-    add_four(sums, b, 0, p * ux - q * wx, p * uy - q * wy, p * uz - q * wz, s)
+    add_moment(sums, b, X, (b, c, a), 0.5 * bc + s * gc, 0.5 * ba + s * ga, s)
     s = ca + cb
-    p, q = 0.5 * ca + s * ga, 0.5 * cb + s * gb
-    add_four(sums, c, 0, p * vx - q * ux, p * vy - q * uy, p * vz - q * uz, s)
+    add_moment(sums, c, X, (c, a, b), 0.5 * ca + s * ga, 0.5 * cb + s * gb, s)
 
 
 @inlined

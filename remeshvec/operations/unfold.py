@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.compiler import threaded
-from ..core.geometry import area_vector, turn_exceeds
+from ..core.compiler import inlined, threaded
+from ..core.geometry import area_vector, point, turn_exceeds
 from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, FloatArray, Mesh
 from ..mesh.blocks import make_candidates, per_block
 from ..mesh.walk import corners_of
@@ -86,28 +86,27 @@ def _find_folded_edges(span, mesh, blocks, before, vectors, marked, found):
             a, b, c = corners_of(mesh.origin, f)
             if a == DEAD:
                 continue
-            new = vectors[f, 0], vectors[f, 1], vectors[f, 2]
+            here = point(vectors, f)
             limit = (NO_AREA * mesh.X[a, 3] * mesh.X[a, 3]) ** 2
-            is_bad = not squared_norm(new) > limit
-            if is_bad:
-                old = area_vector(before, a, b, c)
-                is_bad = squared_norm(old) > limit
+            if not squared_norm(here) > limit:
+                if squared_norm(area_vector(before, a, b, c)) > limit:
+                    _mark_corners(mesh, f, marked)
+                    found[k] += 1
             for h in range(3 * f, 3 * f + 3):
                 t = mesh.twin[h]
-                if t == NONE:
-                    continue
-                g = t // 3
-                other = vectors[g, 0], vectors[g, 1], vectors[g, 2]
-                if is_folded(new, other):
-                    d, e, i = corners_of(mesh.origin, g)
-                    is_bad |= not is_folded(
-                        area_vector(before, a, b, c), area_vector(before, d, e, i)
-                    )
-            if is_bad:
-                marked[a] = 1
-                marked[b] = 1
-                marked[c] = 1
-                found[k] += 1
+                if t != NONE and is_folded(here, point(vectors, t // 3)):
+                    d, e, g = corners_of(mesh.origin, t // 3)
+                    there = area_vector(before, d, e, g)
+                    if not is_folded(area_vector(before, a, b, c), there):
+                        _mark_corners(mesh, f, marked)
+                        found[k] += 1
+
+
+@inlined
+def _mark_corners(mesh, f, marked):
+    """Mark the corners of a face."""
+    for v in corners_of(mesh.origin, f):
+        marked[v] = 1
 
 
 @threaded(per_block)
@@ -132,9 +131,7 @@ def _find_folds(span, mesh, blocks, before, faces, marked, found):
             old = ux, uy, uz = area_vector(before, a, b, c)
             new = area_vector(mesh.X, a, b, c)
             if ux * ux + uy * uy + uz * uz > 0.0 and turn_exceeds(old, new, _COSINE):
-                marked[a] = 1
-                marked[b] = 1
-                marked[c] = 1
+                _mark_corners(mesh, faces.items[i], marked)
                 found[k] += 1
 
 

@@ -140,7 +140,8 @@ def flip(work: Work, sweep: Sweep) -> None:
 def relax(work: Work, sweep: Sweep) -> None:
     """Move vertices in their tangent planes, and those on curves along them."""
     mesh, blocks, reference = work.mesh, work.blocks, work.featured.reference
-    work.before = mesh.X.copy()
+    is_kept = work.featured.has_curves or work.measures_steps or sweep.unfolds
+    work.before = mesh.X.copy() if is_kept else None
     for _ in range(sweep.relaxations):
         slide_vertices(mesh, blocks, reference, work.is_parallel)
         relax_vertices(mesh, blocks, sweep.stiffness, work.is_parallel)
@@ -154,7 +155,8 @@ def project(work: Work, sweep: Sweep) -> None:
         project_vertices(mesh, blocks, reference, WALK_TRUST, work.is_parallel)
     if work.featured.has_curves and work.before is not None:
         undo_folds(mesh, blocks, work.before, work.is_parallel)
-    undo_folded_edges(mesh, blocks, work.before, work.is_parallel)
+    if sweep.unfolds and work.before is not None:
+        undo_folded_edges(mesh, blocks, work.before, work.is_parallel)
     refresh_lengths(work)
     if work.measures_steps and work.before is not None:
         work.step = _mean_step(mesh, work.before)

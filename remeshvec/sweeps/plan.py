@@ -28,6 +28,7 @@ class Sweep:
     relaxations: int
     stiffness: float  # hold of curved ridges on their vertices while relaxing
     projects: bool  # whether vertices go back to the input
+    unfolds: bool  # whether moves that fold an edge are taken back: folds of earlier sweeps mostly vanish
     compares_lengths: bool  # whether adaptive lengths are corrected afterwards
 
 
@@ -81,6 +82,7 @@ def make_schedule(recipe: Recipe) -> list[Sweep]:
                 relaxations=recipe.last_relaxations if left == 1 else 1,
                 stiffness=recipe.stiffness,
                 projects=recipe.project and (always or left <= recipe.projected_sweeps),
+                unfolds=left == 1,
                 compares_lengths=left in _COMPARISONS,
             )
         )

@@ -12,7 +12,7 @@ from ..operations.frames import FRAME_SIZE, measure_frames
 from ..operations.lloyd import Pace, run_lloyd_round
 from ..operations.project import project_vertices
 from ..operations.slide import slide_vertices
-from ..operations.unfold import undo_folded_edges, undo_folds
+from ..operations.unfold import undo_folded_edges
 from ..reference.bvh import WALK_TRUST
 from .guard import Guard
 from .phases import refresh_lengths
@@ -20,15 +20,19 @@ from .work import Work
 
 __all__ = ["even_out"]
 
-# Rounds between two passes of flips, and between two projections with new frames. Frames that are
-# frozen for 4 to 12 rounds give the same, and cost more than two rounds.
-_FLIP_EVERY = 4
-_PROJECT_EVERY = 8
+# Rounds between two passes of flips; 4 cost .08 of the area error, in percent.
+_FLIP_EVERY = 2
 
-# Stiffness of the frames; a round moves vertices less than a relaxation does, but there are many.
-_STIFFNESS = 400.0
+# Rounds between two projections with new frames: frames may be as old as this.
+_PROJECT_EVERY = 10
 
-# Longest step of a round, in target lengths.
+# Stiffness of the frames. More keeps vertices on ridges (RMS and Hausdorff distance), less gives more
+# even areas on rough meshes: at 1000 the distance is 1 % smaller, and the area error of a noisy mesh .2
+# larger, than at 400.
+_STIFFNESS = 600.0
+
+# Longest step of a round, in target lengths. Without a bound rounds on thin parts blow up; between .03
+# and .08 it changes nothing.
 _REACH = 0.05
 
 
@@ -43,24 +47,20 @@ def even_out(work: Work, guard: Guard) -> None:
 
 def _run_rounds(work: Work) -> None:
     """Move vertices towards the centroids of their cells; flip and project from time to time."""
-    recipe, mesh, parallel = work.plan.recipe, work.mesh, work.is_parallel
+    recipe, mesh, blocks, parallel = work.plan.recipe, work.mesh, work.blocks, work.is_parallel
     pace = Pace(recipe.round_gain, recipe.round_momentum, _REACH)
     velocity = np.zeros((len(mesh.X), 3))
     frames = np.empty((len(mesh.X), FRAME_SIZE))
-    before = mesh.X
-    for n in range(recipe.rounds):
-        if n % _FLIP_EVERY == 0:
-            _flip(work)
-            before = mesh.X.copy()
-        if n % _PROJECT_EVERY == 0:
-            measure_frames(mesh, work.blocks, _STIFFNESS, frames, parallel)
-        slide_vertices(mesh, work.blocks, work.featured.reference, parallel)
-        run_lloyd_round(mesh, work.blocks, frames, velocity, pace, work.varies, parallel)
-        is_last = n + 1 == recipe.rounds
-        if is_last or (n + 1) % _PROJECT_EVERY == 0:
-            _project(work)
-        if is_last or (n + 1) % _FLIP_EVERY == 0:
-            _unfold(work, before, velocity)
+    for first in range(0, recipe.rounds, _PROJECT_EVERY):
+        start = mesh.X.copy()
+        measure_frames(mesh, blocks, _STIFFNESS, frames, parallel)
+        for n in range(first, min(first + _PROJECT_EVERY, recipe.rounds)):
+            if n % _FLIP_EVERY == 0:
+                _flip(work)
+            slide_vertices(mesh, blocks, work.featured.reference, parallel)
+            run_lloyd_round(mesh, blocks, frames, velocity, pace, work.varies, parallel)
+        _project(work)
+        _unfold(work, start, velocity)
 
 
 def _flip(work: Work) -> None:
@@ -84,9 +84,6 @@ def _project(work: Work) -> None:
 
 
 def _unfold(work: Work, before: FloatArray, velocity: FloatArray) -> None:
-    """Take back moves that fold, and stop the vertices that made them."""
-    mesh, blocks = work.mesh, work.blocks
-    count = undo_folds(mesh, blocks, before, work.is_parallel)
-    count += undo_folded_edges(mesh, blocks, before, work.is_parallel)
-    if count:
-        velocity[(mesh.X[:, :3] == before[:, :3]).all(axis=1)] = 0.0
+    """Take back moves that folded an edge, and stop the vertices that made them."""
+    if undo_folded_edges(work.mesh, work.blocks, before, work.is_parallel):
+        velocity[(work.mesh.X[:, :3] == before[:, :3]).all(axis=1)] = 0.0
