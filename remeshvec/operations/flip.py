@@ -142,7 +142,7 @@ def _find_trades(span, mesh, blocks, limits, candidates):
             for i in range(3):
                 h = 3 * f + i
                 t = mesh.twin[h]
-                may_gain = (1 * (ea > 0) + (eb > 0) + (ec < 0) >= 2) & (t < h)
+                may_gain = _may_gain(ea, eb, ec) & (t < h)
                 item[end] = h
                 end += (t != NONE) & (may_gain | (lc > la + lb))
                 ea, eb, ec = eb, ec, ea
@@ -163,9 +163,17 @@ def _squared_sides(X, a, b, c):
 
 
 @inlined
+def _may_gain(ea, eb, ec):
+    """Tell whether a flip may gain valence, from the excess at the ends of an edge and one apex."""
+    return 1 * (ea > 0) + (eb > 0) + (ec < 0) >= 2
+
+
+@inlined
 def _is_listed(mesh, h, t):
-    """Tell whether the half-edge ``t`` was listed, the larger one of an edge that is wanted."""
-    return dot_opposite(mesh, t) < 0.0 or valence_gain(mesh, h, t) > 0
+    """Tell whether ``t``, the larger half-edge of an edge, was listed."""
+    excess = mesh.valence_excess
+    a, b, _, d = quad_of(mesh, h, t)
+    return dot_opposite(mesh, t) < 0.0 or _may_gain(excess[a], excess[b], excess[d])
 
 
 @threaded(per_block)

@@ -88,10 +88,12 @@ def _find_folded_edges(span, mesh, blocks, before, vectors, marked, found):
                 continue
             here = point(vectors, f)
             limit = (NO_AREA * mesh.X[a, 3] * mesh.X[a, 3]) ** 2
-            if not squared_norm(here) > limit:
-                if squared_norm(area_vector(before, a, b, c)) > limit:
-                    _mark_corners(mesh, f, marked)
-                    found[k] += 1
+            if (
+                not squared_norm(here) > limit
+                and squared_norm(area_vector(before, a, b, c)) > limit
+            ):
+                _mark_corners(mesh, f, marked)
+                found[k] += 1
             for h in range(3 * f, 3 * f + 3):
                 t = mesh.twin[h]
                 if t != NONE and is_folded(here, point(vectors, t // 3)):

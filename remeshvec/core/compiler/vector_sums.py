@@ -1,7 +1,7 @@
 """Sums into rows of four numbers, with vector instructions.
 
-Relaxation and Lloyd rounds spend their time on these sums. LLVM cannot prove that two rows do not overlap, and Numba leaves
-out the pass that would try, so the instructions are emitted here.
+Relaxation and Lloyd rounds spend their time on these sums. LLVM cannot prove that two rows do not
+overlap, and Numba leaves out the pass that would try, so the instructions are emitted here.
 """
 
 from __future__ import annotations
