@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, radians
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,20 @@ from .options import RemeshOptions
 __all__ = ["PRESETS", "Recipe", "make_recipe"]
 
 Schedule = tuple[float, ...]
+
+
+class Rounds(NamedTuple):
+    """Lloyd rounds, one after the other.
+
+    A high gain with some momentum is the fastest way to a mesh that is even nearby. A small gain with a
+    momentum near 1 shakes the mesh: defects of the valences meet and vanish, as in annealing.
+    """
+
+    count: int
+    gain: float = 3.0  # share of the way to the centroid that is added to the velocity
+    momentum: float = 0.85  # share of the velocity that stays
+    trade_angle: float = 25.0  # degrees by which opposite angles must outweigh a step of valence
+    stiffness: float = 600.0  # hold of curved ridges on their vertices
 
 
 @dataclass(frozen=True)
@@ -37,10 +51,7 @@ class Recipe:
     last_relaxations: int = 0  # relaxations in the last sweep, one before
     project: bool = True
     projected_sweeps: int = 8  # the last sweeps, which project
-    rounds: int = 20  # Lloyd rounds after the sweeps
-    round_gain: float = 3.0  # share of the way to the centroid that a round adds to the velocity
-    round_momentum: float = 0.85  # share of the velocity that stays
-    trade_angle: float = 25.0  # degrees by which opposite angles outweigh a step of valence
+    rounds: tuple[Rounds, ...] = (Rounds(20),)  # after the sweeps
     untangle_rounds: int = 4
     untangle_angle: float = 43.8  # degrees; triangles below it are untangled
     fit_rounds: int = 0
@@ -78,10 +89,20 @@ PRESETS: dict[str, Recipe] = {
         flip_passes=1,
         stiffness=0.0,
         last_relaxations=1,
-        rounds=0,
+        rounds=(),
         untangle_rounds=0,
     ),
     "default": _DEFAULT,
+    "even": replace(
+        _DEFAULT,
+        preset="even",
+        rounds=(
+            Rounds(460, gain=1.0, momentum=0.998, trade_angle=10.0, stiffness=1200.0),
+            Rounds(40, trade_angle=10.0),
+        ),
+        untangle_rounds=8,
+        untangle_angle=44.1,
+    ),
     "fine": replace(
         _DEFAULT,
         preset="fine",

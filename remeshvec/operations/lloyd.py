@@ -31,7 +31,7 @@ from ..mesh.blocks import (
 )
 from ..mesh.walk import corners_of
 
-__all__ = ["Pace", "run_lloyd_round"]
+__all__ = ["Pace", "run_lloyd_round", "turn_velocities"]
 
 # Weights of the lengths at a corner, at the other end of the side, and at the third corner in that of a
 # half cell. Its centroid has (.611, .278, .111), but densities at centroids carry only 87 % of the
@@ -77,6 +77,40 @@ def run_lloyd_round(
     for stage in stages(blocks)[1:]:
         _sum_cells_across(parallel, mesh, blocks, stage, varies, sums, across)
     _move(parallel, mesh, blocks, frames, velocity, pace, sums)
+
+
+def turn_velocities(
+    mesh: Mesh, blocks: Blocks, frames: FloatArray, velocity: FloatArray, parallel: bool
+) -> None:
+    """Turn velocities into new frames.
+
+    Without this, a momentum near 1 carries vertices off thin ridges: the Hausdorff distance of a rough
+    mesh went up by half, now by a few percent.
+    """
+    _turn(parallel, mesh, blocks, frames, velocity)
+
+
+@threaded(per_block)
+def _turn(span, mesh, blocks, frames, velocity):
+    """Apply frames to velocities."""
+    for k in range(span[0], span[1]):
+        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
+            velocity[v, 0], velocity[v, 1], velocity[v, 2] = _framed(
+                frames, v, (velocity[v, 0], velocity[v, 1], velocity[v, 2])
+            )
+
+
+@inlined
+def _framed(frames, v, step):
+    """Apply the frame of a vertex to a vector."""
+    dx, dy, dz = step
+    xx, xy, xz = frames[v, 0], frames[v, 1], frames[v, 2]
+    yy, yz, zz = frames[v, 3], frames[v, 4], frames[v, 5]
+    return (
+        xx * dx + xy * dy + xz * dz,
+        xy * dx + yy * dy + yz * dz,
+        xz * dx + yz * dy + zz * dz,
+    )
 
 
 @threaded(per_block)
@@ -179,12 +213,11 @@ def _move(span, mesh, blocks, frames, velocity, pace, sums):
     for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             scale = pace.gain / (3.0 * sums[v, 3]) if sums[v, 3] > 0.0 else 0.0
-            dx, dy, dz = sums[v, 0] * scale, sums[v, 1] * scale, sums[v, 2] * scale
-            xx, xy, xz = frames[v, 0], frames[v, 1], frames[v, 2]
-            yy, yz, zz = frames[v, 3], frames[v, 4], frames[v, 5]
-            x = pace.momentum * velocity[v, 0] + xx * dx + xy * dy + xz * dz
-            y = pace.momentum * velocity[v, 1] + xy * dx + yy * dy + yz * dz
-            z = pace.momentum * velocity[v, 2] + xz * dx + yz * dy + zz * dz
+            step = sums[v, 0] * scale, sums[v, 1] * scale, sums[v, 2] * scale
+            dx, dy, dz = _framed(frames, v, step)
+            x = pace.momentum * velocity[v, 0] + dx
+            y = pace.momentum * velocity[v, 1] + dy
+            z = pace.momentum * velocity[v, 2] + dz
             squared, limit = x * x + y * y + z * z, pace.reach * X[v, 3]
             if squared > limit * limit:
                 shorter = limit / sqrt(squared)

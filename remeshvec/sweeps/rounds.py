@@ -7,9 +7,10 @@ from math import cos, radians, tan
 import numpy as np
 
 from ..core.vocabulary import FloatArray
+from ..input.recipe import Rounds
 from ..operations.flip import FlipLimits, flip_edges
 from ..operations.frames import FRAME_SIZE, measure_frames
-from ..operations.lloyd import Pace, run_lloyd_round
+from ..operations.lloyd import Pace, run_lloyd_round, turn_velocities
 from ..operations.project import project_vertices
 from ..operations.slide import slide_vertices
 from ..operations.unfold import undo_folded_edges
@@ -26,11 +27,6 @@ _FLIP_EVERY = 2
 # Rounds between two projections with new frames: frames may be as old as this.
 _PROJECT_EVERY = 10
 
-# Stiffness of the frames. More keeps vertices on ridges (RMS and Hausdorff distance), less gives more
-# even areas on rough meshes: at 1000 the distance is 1 % smaller, and the area error of a noisy mesh .2
-# larger, than at 400.
-_STIFFNESS = 600.0
-
 # Longest step of a round, in target lengths. Without a bound rounds on thin parts blow up; between .03
 # and .08 it changes nothing.
 _REACH = 0.05
@@ -38,40 +34,41 @@ _REACH = 0.05
 
 def even_out(work: Work, guard: Guard) -> None:
     """Run the Lloyd rounds of the recipe on a compact mesh; a guard may try them as it tries a sweep."""
-    if work.plan.recipe.rounds == 0 or work.monitor.is_cancelled:
+    if not work.plan.recipe.rounds or work.monitor.is_cancelled:
         return
     with work.monitor.watch.time("even out"):
         for trial in guard.attempts(work, is_compact=True):
-            _run_rounds(trial)
+            for rounds in work.plan.recipe.rounds:
+                _run(trial, rounds)
 
 
-def _run_rounds(work: Work) -> None:
+def _run(work: Work, rounds: Rounds) -> None:
     """Move vertices towards the centroids of their cells; flip and project from time to time."""
-    recipe, mesh, blocks, parallel = work.plan.recipe, work.mesh, work.blocks, work.is_parallel
-    pace = Pace(recipe.round_gain, recipe.round_momentum, _REACH)
+    mesh, blocks, parallel = work.mesh, work.blocks, work.is_parallel
+    pace = Pace(rounds.gain, rounds.momentum, _REACH)
     velocity = np.zeros((len(mesh.X), 3))
     frames = np.empty((len(mesh.X), FRAME_SIZE))
-    for first in range(0, recipe.rounds, _PROJECT_EVERY):
+    for first in range(0, rounds.count, _PROJECT_EVERY):
+        if work.monitor.is_cancelled:
+            return
         start = mesh.X.copy()
-        measure_frames(mesh, blocks, _STIFFNESS, frames, parallel)
-        for n in range(first, min(first + _PROJECT_EVERY, recipe.rounds)):
+        measure_frames(mesh, blocks, rounds.stiffness, frames, parallel)
+        turn_velocities(mesh, blocks, frames, velocity, parallel)
+        for n in range(first, min(first + _PROJECT_EVERY, rounds.count)):
             if n % _FLIP_EVERY == 0:
-                _flip(work)
+                _flip(work, rounds)
             slide_vertices(mesh, blocks, work.featured.reference, parallel)
             run_lloyd_round(mesh, blocks, frames, velocity, pace, work.varies, parallel)
         _project(work)
         _unfold(work, start, velocity)
+        work.monitor.report("even out")
 
 
-def _flip(work: Work) -> None:
+def _flip(work: Work, rounds: Rounds) -> None:
     """Flip edges where the angles opposite outweigh the valences, or the other way round."""
     recipe = work.plan.recipe
-    limits = FlipLimits(
-        cos(radians(recipe.flip_normal)),
-        True,
-        recipe.sliver_check,
-        tan(radians(recipe.trade_angle)),
-    )
+    cosine, trade = cos(radians(recipe.flip_normal)), tan(radians(rounds.trade_angle))
+    limits = FlipLimits(cosine, True, recipe.sliver_check, trade)
     flip_edges(work.mesh, work.blocks, limits, work.is_parallel)
 
 

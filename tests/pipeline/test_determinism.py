@@ -298,7 +298,7 @@ def assert_identical(seen):
     assert [seen[case][1] for case in seen if case.startswith(("2", "4"))][:2] == [2, 4]
 
 
-@pytest.mark.parametrize("preset", ["fast", "default", "fine"])
+@pytest.mark.parametrize("preset", ["fast", "default", "even", "fine"])
 def test_threads_give_the_same_bits(tmp_path, preset):
     V, F = mesh()
     assert_identical(digests(tmp_path, V, F, 0.8 * zoo.mean_edge(V, F), preset=preset))

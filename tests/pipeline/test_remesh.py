@@ -11,7 +11,7 @@ from helpers.structure import shape_of
 
 from remeshvec import remesh
 
-PRESETS = ["fast", "default", "fine"]
+PRESETS = ["fast", "default", "even", "fine"]
 
 
 def distance(P, V, F):
