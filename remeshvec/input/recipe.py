@@ -26,7 +26,7 @@ class Rounds(NamedTuple):
     momentum near 1 shakes the mesh: defects of the valences meet and vanish, as in annealing.
     """
 
-    count: int
+    number: int
     gain: float = 3.0  # share of the way to the centroid that is added to the velocity
     momentum: float = 0.85  # share of the velocity that stays
     trade_angle: float = 25.0  # degrees by which opposite angles must outweigh a step of valence

@@ -185,7 +185,7 @@ class Job:
         stop = run_sweeps(work, make_schedule(self.recipe), guard)
         if has_finish(work):
             finish(work, guard)
-        return work, stop
+        return work, Stop.CANCELLED if self.monitor.is_cancelled else stop
 
     def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
         """Set the lengths of a mesh, mark its features, build the reference."""

@@ -157,8 +157,8 @@ def remesh(
         Threads to use at most; all by default. Meshes below 50,000 faces use one.
     callback : callable, optional
         Called as ``callback(sweep, phase, count)`` after each phase, and as phase ``"even out"`` in the
-        rounds after the last sweep; returning False (Python's or
-        NumPy's; not None or 0) ends the call with the mesh as it is then.
+        rounds after the last sweep; returning False (Python's or NumPy's; not None or 0) ends the call
+        with the mesh as it is then.
 
     Returns
     -------

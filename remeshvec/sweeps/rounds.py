@@ -48,13 +48,13 @@ def _run(work: Work, rounds: Rounds) -> None:
     pace = Pace(rounds.gain, rounds.momentum, _REACH)
     velocity = np.zeros((len(mesh.X), 3))
     frames = np.empty((len(mesh.X), FRAME_SIZE))
-    for first in range(0, rounds.count, _PROJECT_EVERY):
+    for first in range(0, rounds.number, _PROJECT_EVERY):
         if work.monitor.is_cancelled:
             return
         start = mesh.X.copy()
         measure_frames(mesh, blocks, rounds.stiffness, frames, parallel)
         turn_velocities(mesh, blocks, frames, velocity, parallel)
-        for n in range(first, min(first + _PROJECT_EVERY, rounds.count)):
+        for n in range(first, min(first + _PROJECT_EVERY, rounds.number)):
             if n % _FLIP_EVERY == 0:
                 _flip(work, rounds)
             slide_vertices(mesh, blocks, work.featured.reference, parallel)

@@ -167,5 +167,5 @@ def test_bad_options_are_named(overrides, message):
 
 @pytest.mark.parametrize("preset", ["quick", "", "DEFAULT", None, 3, ["fast"], {}])
 def test_unknown_presets(preset):
-    with pytest.raises(OptionError, match="preset must be one of fast, default, fine"):
+    with pytest.raises(OptionError, match="preset must be one of fast, default, even, fine"):
         options(preset)

@@ -97,7 +97,7 @@ def test_frames_turn_and_stop_steps():
 def test_areas_become_even_and_momentum_helps():
     """On a sphere whose vertices lie denser towards a pole: long waves decay slowly without momentum."""
     V, F = zoo.icosphere(3)
-    V = V + [0.0, 0.0, 0.3]
+    V = V + np.array([0.0, 0.0, 0.3])
     V /= np.linalg.norm(V, axis=1)[:, None]
     spread = lambda W: np.std(naive.voronoi_areas(W, F)) / np.mean(naive.voronoi_areas(W, F))  # noqa: E731
     after = []
