@@ -89,8 +89,8 @@ def remesh(
     return_result : bool
         With a mesh object, return a pair of the new object and the `RemeshResult`.
     n_faces, n_vertices : int, optional
-        Number of faces or vertices instead of ``L``, met within 2 % where the shape allows it;
-        ``report.stop`` says where it does not.
+        Number of faces or vertices instead of ``L``. Vertices are met exactly, faces within one: a closed
+        mesh has an even number. ``report.stop`` says where edges that must stay do not allow it.
     gradation : float
         Largest ratio of the target lengths at the ends of an edge, where ``L`` varies.
     max_deviation : float, optional

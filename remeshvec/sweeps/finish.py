@@ -16,6 +16,7 @@ from ..operations.untangle import approach_vertices, untangle_vertices
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_copies
 from ..sizing.target_lengths import bound_gradation
+from .counts import meet_count
 from .deviation import DeviationCheck, edges_to_refine
 from .flaws import count_new_flaws
 from .guard import Guard
@@ -48,7 +49,13 @@ def has_finish(work: Work) -> bool:
     recipe = plan.recipe
     moves = recipe.project or recipe.rounds or recipe.untangle_rounds or recipe.fit_rounds
     is_bounded = recipe.max_deviation is not None or plan.adaptation is not None
-    return bool(moves or is_bounded or work.varies or work.featured.on_non_manifold is not None)
+    return bool(
+        moves
+        or is_bounded
+        or plan.count
+        or work.varies
+        or work.featured.on_non_manifold is not None
+    )
 
 
 def finish(work: Work, guard: Guard) -> None:
@@ -56,6 +63,7 @@ def finish(work: Work, guard: Guard) -> None:
     watch = work.monitor.watch
     with watch.time("extract"):
         work.compact()
+        meet_count(work, guard)
     even_out(work, guard)
     with watch.time("extract"):
         _let_go(work)

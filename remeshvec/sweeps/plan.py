@@ -11,7 +11,7 @@ from ..input.recipe import Recipe
 from ..operations.collapse import CollapseLimits
 from ..operations.flip import FlipLimits
 
-__all__ = ["Adaptation", "Plan", "Sweep", "make_schedule"]
+__all__ = ["Adaptation", "Count", "Plan", "Sweep", "make_schedule"]
 
 # Sweeps, counted from the last one as 1, after which lengths are compared with what they led to.
 _COMPARISONS = (7, 5, 3)
@@ -42,6 +42,19 @@ class Adaptation:
 
 
 @dataclass(frozen=True)
+class Count:
+    """A number of faces or vertices to be met."""
+
+    noun: str  # "faces" or "vertices"
+    wanted: int
+
+    @property
+    def per_edge(self) -> int:
+        """How many a split of an inner edge makes."""
+        return 2 if self.noun == "faces" else 1
+
+
+@dataclass(frozen=True)
 class Plan:
     """All that the sweeps of one mesh need to know besides the mesh."""
 
@@ -49,6 +62,7 @@ class Plan:
     scale: float = 1.0  # of the frame that the mesh comes in
     gradation: float = float("inf")  # largest ratio of the lengths at the ends of an edge
     adaptation: Adaptation | None = None  # None where lengths do not follow from the curvature
+    count: Count | None = None
     max_faces: int = LARGEST_MESH  # that the caller allows in a result
     most_faces: int = LARGEST_MESH  # on the way to it
 
