@@ -190,11 +190,12 @@ def test_numbers_of_vertices(name):
 def test_counts_of_a_closed_mesh_are_exact(wanted, preset):
     """Odd numbers of faces do not exist on closed meshes; the last splits and collapses leave no mark."""
     V, F = zoo.perturb(*zoo.upsampled(*zoo.torus(30, 14), noise=0.3), 0.03)
-    by_vertices = remesh(V, F, n_vertices=wanted, preset=preset)
+    options = {"preset": preset, "feature_angle": None}
+    by_vertices = remesh(V, F, n_vertices=wanted, **options)
     assert len(by_vertices.V) == wanted
-    by_faces = remesh(V, F, n_faces=2 * wanted + 1, preset=preset)
+    by_faces = remesh(V, F, n_faces=2 * wanted + 1, **options)
     assert abs(len(by_faces.F) - 2 * wanted - 1) == 1
-    assert len(remesh(V, F, n_faces=2 * wanted, preset=preset).F) == 2 * wanted
+    assert len(remesh(V, F, n_faces=2 * wanted, **options).F) == 2 * wanted
     least = {"fast": 20.0, "default": 33.0}[preset]
     assert quality(*by_vertices).min_angle > least
 
