@@ -18,7 +18,7 @@ from ..sizing.adaptive import Adaptive
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
 from ..sweeps.counts import count_elements
 from ..sweeps.deviation import DeviationCheck
-from ..sweeps.finish import finish, has_finish, measure_deviation
+from ..sweeps.finish import deviation_of, finish, has_finish
 from ..sweeps.flaws import CrossingCheck, FoldCheck, count_new_flaws
 from ..sweeps.guard import Check, Guard, HoldingGuard
 from ..sweeps.loop import Stop, run_sweeps
@@ -131,7 +131,7 @@ class Job:
         before = meshes[0].copy()
         work, stop, n_flaws = self._without_flaws(meshes.pop(), before, featured)
         is_compact = has_finish(work)
-        deviation = measure_deviation(work)
+        deviation = deviation_of(work)
         missed = _missed(deviation, self.recipe.max_deviation, self.sizing.L)
         return Remeshed(
             work.mesh,
@@ -181,7 +181,8 @@ class Job:
         if bound is not None:
             checks = (*checks, DeviationCheck(featured, bound, work.is_parallel))
         guard = HoldingGuard(checks, work.is_parallel) if checks else Guard()
-        stop = run_sweeps(work, make_schedule(self.recipe), guard)
+        schedule = make_schedule(self.recipe, self.plan.adaptation is not None)
+        stop = run_sweeps(work, schedule, guard)
         if has_finish(work):
             finish(work, guard)
         return work, Stop.CANCELLED if self.monitor.is_cancelled else stop

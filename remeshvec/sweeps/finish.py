@@ -7,40 +7,36 @@ from math import cos, radians
 import numpy as np
 
 from ..core.vocabulary import CURVE, HELD, INNER, PINNED
+from ..input.recipe import Rounds
 from ..operations.fit import fit_vertices
-from ..operations.flip import FlipLimits, flip_edges
 from ..operations.project import project_vertices
 from ..operations.split import split_edges
 from ..operations.unfold import undo_folded_edges, undo_folds
-from ..operations.untangle import approach_vertices, untangle_vertices
+from ..operations.untangle import untangle_vertices
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_copies
 from ..sizing.target_lengths import bound_gradation
 from .counts import meet_count
-from .deviation import DeviationCheck, edges_to_refine
+from .deviation import edges_to_refine, measure_deviation
 from .flaws import count_new_flaws
 from .guard import Guard
-from .plan import Adaptation
-from .rounds import even_out
+from .rounds import even_out, run_rounds
 from .sheets import separate_sheets
 from .work import Work
 
-__all__ = ["finish", "has_finish", "measure_deviation"]
+__all__ = ["deviation_of", "finish", "has_finish"]
 
 # How far a fit may move a vertex, as a share of the target length.
 _FIT_REACH = 0.2
 
-# Faces made for a tolerance are moved until their centroids, which are not where they are worst, and
-# split until their samples keep these shares of it. Where more than this share of all faces would be
-# split, the input is rougher than the tolerance, and splits would follow its own faces.
-_CENTROID_SHARE = 0.84
-_SAMPLE_SHARE = 1.0
+# Splits that bring faces within the tolerance of adaptive lengths; each takes a quarter off the error.
+# Where more than this share of all faces would be split, the input is rougher than the tolerance, and
+# splits would follow its own faces.
+_REFINEMENTS = 3
 _ROUGH = 0.05
 
-# Rounds of moves that make the largest faces smaller; then of splits where chords are still too long,
-# each of which takes a quarter off the error.
-_EVENING_ROUNDS = 20
-_REFINEMENTS = 3
+# Rounds after each: few, because only the surroundings of the splits are uneven.
+_ROUNDS = Rounds(10)
 
 
 def has_finish(work: Work) -> bool:
@@ -117,48 +113,30 @@ def refine(work: Work) -> None:
     if work.plan.adaptation is None:
         return
     before = work.trial()
-    _refine(work, work.plan.adaptation)
+    _refine(work, work.plan.adaptation.tolerance)
     if count_new_flaws(before.mesh, work.mesh, False, work.is_parallel):
         work.adopt(before)
 
 
-def _refine(work: Work, adaptation: Adaptation) -> None:
-    """Bring faces within the tolerance, first by moving vertices, then by splits of the longest edge.
+def _refine(work: Work, tolerance: float) -> None:
+    """Split the longest edge of faces that are off; rounds and the polish follow, so angles stay good.
 
-    A third of the squared length is the squared circumradius of an equilateral face.
+    To move the vertices of such faces instead took most of the time of a call, and made slivers.
     """
-    tolerance, recipe = adaptation.tolerance, work.plan.recipe
-    reference = work.featured.reference
-    for _ in range(_EVENING_ROUNDS):
-        if not approach_vertices(
-            work.mesh,
-            work.blocks,
-            reference.tree,
-            recipe.project,
-            1.0 / 3.0,
-            _CENTROID_SHARE * tolerance,
-            work.is_parallel,
-        ):
-            break
-    flips = FlipLimits(cos(radians(recipe.flip_normal)), False, True)
     for _ in range(_REFINEMENTS):
-        parallel = work.is_parallel
-        edges = edges_to_refine(work.mesh, work.featured, _SAMPLE_SHARE * tolerance, parallel)
+        edges = edges_to_refine(work.mesh, work.featured, tolerance, work.is_parallel)
         if not 0 < len(edges) <= _ROUGH * work.n_faces:
             break
-        work.put(split_edges(work.mesh, work.blocks, edges, parallel))
-        project_vertices(work.mesh, work.blocks, reference, WALK_TRUST, parallel)
-        flip_edges(work.mesh, work.blocks, flips, parallel)
+        work.put(split_edges(work.mesh, work.blocks, edges, work.is_parallel))
+        run_rounds(work, _ROUNDS)
+        polish(work)
 
 
-def measure_deviation(work: Work) -> dict[str, float]:
+def deviation_of(work: Work) -> dict[str, float]:
     """Measure how far the two surfaces are apart, in the caller's units, where a bound was asked for."""
     plan = work.plan
-    bound = plan.max_deviation
-    if bound is None:
-        if plan.adaptation is None:
-            return {}
-        bound = plan.adaptation.tolerance
+    if plan.max_deviation is None and plan.adaptation is None:
+        return {}
     with work.monitor.watch.time("deviation"):
-        check = DeviationCheck(work.featured, bound, work.is_parallel)
-        return {way: d / plan.scale for way, d in check.measure(work.mesh).items()}
+        found = measure_deviation(work.mesh, work.featured, work.is_parallel)
+        return {way: float(d / plan.scale) for way, d in found.items()}

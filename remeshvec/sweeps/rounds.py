@@ -19,7 +19,7 @@ from .guard import Guard
 from .phases import refresh_lengths
 from .work import Work
 
-__all__ = ["even_out"]
+__all__ = ["even_out", "run_rounds"]
 
 # Rounds between two passes of flips; 4 cost .08 of the area error, in percent.
 _FLIP_EVERY = 2
@@ -39,10 +39,10 @@ def even_out(work: Work, guard: Guard) -> None:
     with work.monitor.watch.time("even out"):
         for trial in guard.attempts(work, is_compact=True):
             for rounds in work.plan.recipe.rounds:
-                _run(trial, rounds)
+                run_rounds(trial, rounds)
 
 
-def _run(work: Work, rounds: Rounds) -> None:
+def run_rounds(work: Work, rounds: Rounds) -> None:
     """Move vertices towards the centroids of their cells; flip and project from time to time."""
     mesh, blocks, parallel = work.mesh, work.blocks, work.is_parallel
     pace = Pace(rounds.gain, rounds.momentum, _REACH)

@@ -56,7 +56,7 @@ def test_rounds_keep_boundaries_flat_meshes_and_corners(name):
 def test_held_vertices_stay(monkeypatch):
     """Tips, and what a guard holds, do not move in rounds."""
     seen = []
-    run = rounds._run
+    run = rounds.run_rounds
 
     def look(work, stage):
         held = np.flatnonzero(work.mesh.kind == HELD)
@@ -65,7 +65,7 @@ def test_held_vertices_stay(monkeypatch):
         seen.append(len(held))
         assert np.array_equal(work.mesh.X[held], before)
 
-    monkeypatch.setattr(rounds, "_run", look)
+    monkeypatch.setattr(rounds, "run_rounds", look)
     V, F = zoo.bipyramid(20, top=3.0, bottom=-3.0)
     remesh(*zoo.upsampled(V, F, n=3), 0.15, feature_angle=None)
     assert seen and seen[0] > 0
