@@ -35,13 +35,13 @@ from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.flip import FlipLimits, flip_edges
 from remeshvec.operations.frames import FRAME_SIZE, measure_frames
-from remeshvec.operations.lloyd import Pace, run_lloyd_round
+from remeshvec.operations.lloyd import Pace, run_lloyd_round, turn_velocities
 from remeshvec.operations.project import project_curves, read_lengths
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
 from remeshvec.operations.unfold import undo_folded_edges, undo_folds
-from remeshvec.operations.untangle import approach_vertices, untangle_vertices
+from remeshvec.operations.untangle import untangle_vertices
 from remeshvec.output import extract
 from remeshvec.reference.bvh import Surface, closest_faces
 from remeshvec.reference.crossings import crossing_faces
@@ -88,7 +88,6 @@ def phases():
     yield "project", lambda m, b, r, p: project(shifted(m), r, b, p)
     yield "project curves", lambda m, b, r, p: project_curves(shifted(m), b, r, p)
     yield "untangle", lambda m, b, r, p: untangle_vertices(m, b, r.tree, True, 0.8, 2, p)
-    yield "approach", lambda m, b, r, p: approach_vertices(m, b, r.tree, True, 0.33, 1e-4, p)
     yield "fit", lambda m, b, r, p: fit_vertices(m, b, r.tree, 0.1, p)
     yield "locate", lambda m, b, r, p: locate(m, r, b, p)
     yield "lengths", lambda m, b, r, p: read_lengths(stretched(m), b, r, p)
@@ -133,6 +132,7 @@ def lloyd_rounds(mesh, blocks, varies, parallel):
     frames, velocity = np.empty((len(mesh.X), FRAME_SIZE)), np.zeros((len(mesh.X), 3))
     for _ in range(3):
         measure_frames(mesh, blocks, 400.0, frames, parallel)
+        turn_velocities(mesh, blocks, frames, velocity, parallel)
         run_lloyd_round(mesh, blocks, frames, velocity, Pace(3.0, 0.85, 0.05), varies, parallel)
     return frames, velocity
 
