@@ -34,9 +34,9 @@ class Adaptive:
     On a surface with a largest absolute principal curvature ``k``, an edge gets the length
     ``sqrt(6 tolerance / k - 3 tolerance^2)``: the middle of an equilateral triangle of that size, with
     its corners on a sphere of curvature ``k``, is off by ``tolerance`` [Dunyach et al. 2013, section 3].
-    Lengths are for 0.9 of the tolerance, and shortened where they turn out too long. A few faces that are
-    still off are split at the end, and rounds that even out areas follow: on a smooth surface 95 % lie
-    within the tolerance and all nearly, on one that is rough at that scale fewer. ``report.deviation``
+    Lengths are for 0.9 of the tolerance, and shortened between sweeps where they turn out too long: on a
+    smooth surface nearly all of it ends within the tolerance, on one that is rough at that scale less.
+    Nothing is split at the end, where it would leave slivers. ``report.deviation``
     says; ``max_deviation`` is a bound.
 
     Parameters

@@ -6,23 +6,19 @@ import numpy as np
 
 from ..core.vocabulary import (
     DEAD,
-    FROZEN,
     HELD,
-    NON_MANIFOLD,
     NONE,
     FloatArray,
     IndexArray,
     Mesh,
     Tree,
 )
-from ..features.polyline import find_siblings
 from ..reference.build import FeaturedReference
 from ..reference.bvh import closest_faces
 from .guard import Offenders, tree_of
 
 __all__ = [
     "DeviationCheck",
-    "edges_to_refine",
     "measure_deviation",
     "sample_mesh",
     "shortened_lengths",
@@ -179,36 +175,6 @@ def shortened_lengths(
     lost = np.where(distance > _LOST * tolerance, distance, 0.0)
     share = tolerance / np.maximum(np.maximum(worst[face], lost), tolerance)
     return np.asarray(X[:, 3] * np.maximum(np.sqrt(share), 0.7))
-
-
-def edges_to_refine(
-    mesh: Mesh, featured: FeaturedReference, tolerance: float, parallel: bool
-) -> IndexArray:
-    """Longest edge of every face with a sample farther than ``tolerance`` from the input.
-
-    Only where it is longer than its target: shorter ones follow ridges of the input's own faces, which
-    splits come no nearer to.
-
-    Returns
-    -------
-    (k,) int32
-        Half-edges that may be split; on seams, those of all sheets.
-    """
-    faces = np.flatnonzero(_worst_distances(mesh, featured, tolerance, parallel) > tolerance)
-    F = mesh.origin.reshape(-1, 3)
-    corners = mesh.X[F[faces], :3]
-    length = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2)
-    length[mesh.curve.reshape(-1, 3)[faces] == FROZEN] = 0.0
-    edges = 3 * faces + length.argmax(axis=1)
-    edges = edges[length.max(axis=1) > mesh.X[F[faces], 3].mean(axis=1)]
-    if featured.on_non_manifold is not None:
-        on_non_manifold = np.flatnonzero(mesh.curve >= NON_MANIFOLD).astype(np.int32)
-        members, group = find_siblings(mesh.X, mesh.origin, on_non_manifold)
-        chosen = np.isin(members, edges)
-        if chosen.any():
-            chosen = np.logical_or.reduceat(chosen, group[:-1])
-            edges = np.union1d(edges, members[np.repeat(chosen, np.diff(group))])
-    return edges.astype(np.int32)
 
 
 def _hints(mesh: Mesh, F: IndexArray, source: IndexArray) -> IndexArray:

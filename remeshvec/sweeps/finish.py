@@ -1,4 +1,4 @@
-"""After the last sweep: even out, project, untangle, fit, and refine what a tolerance asks for."""
+"""After the last sweep: meet a count, even out, project once more, untangle and fit."""
 
 from __future__ import annotations
 
@@ -7,20 +7,17 @@ from math import cos, radians
 import numpy as np
 
 from ..core.vocabulary import CURVE, HELD, INNER, PINNED
-from ..input.recipe import Rounds
 from ..operations.fit import fit_vertices
 from ..operations.project import project_vertices
-from ..operations.split import split_edges
 from ..operations.unfold import undo_folded_edges, undo_folds
 from ..operations.untangle import untangle_vertices
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_copies
 from ..sizing.target_lengths import bound_gradation
 from .counts import meet_count
-from .deviation import edges_to_refine, measure_deviation
-from .flaws import count_new_flaws
+from .deviation import measure_deviation
 from .guard import Guard
-from .rounds import even_out, run_rounds
+from .rounds import even_out
 from .sheets import separate_sheets
 from .work import Work
 
@@ -28,17 +25,6 @@ __all__ = ["deviation_of", "finish", "has_finish"]
 
 # How far a fit may move a vertex, as a share of the target length.
 _FIT_REACH = 0.2
-
-# Splits that bring faces within the tolerance of adaptive lengths; each takes a quarter off the error.
-# Where more than this share of all faces would be split, the input is rougher than the tolerance, and
-# splits would follow its own faces.
-# Faces that are off by a tenth more than the tolerance are left: to split them too takes 10 % more faces.
-_REFINEMENTS = 3
-_SPARED = 1.1
-_ROUGH = 0.05
-
-# Rounds after each: few, because only the surroundings of the splits are uneven.
-_ROUNDS = Rounds(10)
 
 
 def has_finish(work: Work) -> bool:
@@ -70,7 +56,6 @@ def finish(work: Work, guard: Guard) -> None:
     with watch.time("finish"):
         for trial in guard.attempts(work, is_compact=True):
             polish(trial)
-        refine(work)
         if np.ptp(work.mesh.X[:, 3]) > 0.0:
             copies = non_manifold_copies(work.mesh, work.featured)
             bound_gradation(work.mesh, work.plan.gradation, copies)
@@ -105,34 +90,6 @@ def polish(work: Work) -> None:
     for _ in range(recipe.fit_rounds):
         fit_vertices(mesh, blocks, reference.tree, _FIT_REACH, parallel)
     undo_folded_edges(mesh, blocks, before, parallel)
-
-
-def refine(work: Work) -> None:
-    """Bring all faces within the tolerance of adaptive lengths; nothing else asks for this.
-
-    Where that would make folds, faces stay as they are.
-    """
-    if work.plan.adaptation is None:
-        return
-    before = work.trial()
-    _refine(work, work.plan.adaptation.tolerance)
-    if count_new_flaws(before.mesh, work.mesh, False, work.is_parallel):
-        work.adopt(before)
-
-
-def _refine(work: Work, tolerance: float) -> None:
-    """Split the longest edge of faces that are off; rounds and the polish follow, so angles stay good.
-
-    To move the vertices of such faces instead took most of the time of a call, and made slivers.
-    """
-    for _ in range(_REFINEMENTS):
-        limit = _SPARED * tolerance
-        edges = edges_to_refine(work.mesh, work.featured, limit, work.is_parallel)
-        if not 0 < len(edges) <= _ROUGH * work.n_faces:
-            break
-        work.put(split_edges(work.mesh, work.blocks, edges, work.is_parallel))
-        run_rounds(work, _ROUNDS)
-        polish(work)
 
 
 def deviation_of(work: Work) -> dict[str, float]:
