@@ -2,6 +2,7 @@
 
 - ``python -m benchmarks``: time and memory beside other libraries, threads, start, phases; by parts
   (``--help`` lists them), into ``docs/benchmarks.md``, ``threads.md``, ``start.md`` and plots
+- ``python -m benchmarks.presets``: what each preset costs and brings
 - ``python -m benchmarks.quality``: quality of every preset, beside the targets
 - ``python -m benchmarks.control``: what features cost, tolerances and deviations kept
 - ``python -m benchmarks.ablation``: what each ingredient of the default preset brings

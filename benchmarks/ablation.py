@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from remeshvec import quality, remesh, surface_distance
-from remeshvec.input.options import PRESETS, Options
+from remeshvec.input.recipe import PRESETS, Recipe, Rounds
 
 from .meshes import LENGTH_FACTOR, load, small_meshes
 from .quality import TARGETS
@@ -29,18 +29,25 @@ TUNED_ON = ("cat", "iphi_bad10k", "phands", "cow", "wolf_head")
 LEFT_OUT = ("bracket",)
 
 DEFAULT = PRESETS["default"]
-VARIANTS: dict[str, Options] = {
+VARIANTS: dict[str, Recipe] = {
     "default": DEFAULT,
     "stiffness 20": replace(DEFAULT, stiffness=20.0),
     "no stiffness": replace(DEFAULT, stiffness=0.0),
     "midpoint collapses": replace(DEFAULT, quadric_reach=0.0),
     "flips by valence only": replace(DEFAULT, delaunay_ties=False),
     "flip normals within 45 degrees": replace(DEFAULT, flip_normal=45.0),
-    "thresholds 4/5, 4/3 throughout": replace(DEFAULT, collapse=(0.8,) * 12, split=(4 / 3,) * 12),
-    "one relaxation at the end": replace(DEFAULT, last_relaxations=1),
+    "thresholds 4/5, 4/3 throughout": replace(DEFAULT, collapse=(0.8,) * 8, split=(4 / 3,) * 8),
+    "twelve sweeps": replace(DEFAULT, iterations=12),
+    "no rounds, four relaxations at the end": replace(DEFAULT, rounds=(), last_relaxations=4),
+    "ten rounds": replace(DEFAULT, rounds=(Rounds(10),)),
+    "forty rounds": replace(DEFAULT, rounds=(Rounds(40),)),
+    "rounds without momentum": replace(DEFAULT, rounds=(Rounds(20, gain=1.0, momentum=0.0),)),
+    "rounds with stiffness 60": replace(DEFAULT, rounds=(Rounds(20, stiffness=60.0),)),
+    "trades for 10 degrees": replace(DEFAULT, rounds=(Rounds(20, trade_angle=10.0),)),
+    "untangling below 41.5 degrees": replace(DEFAULT, untangle_angle=41.5),
     "no untangling": replace(DEFAULT, untangle_rounds=0),
     "projection in 3 sweeps": replace(DEFAULT, projected_sweeps=3),
-    "projection in all sweeps": replace(DEFAULT, projected_sweeps=12),
+    "projection in 5 sweeps": replace(DEFAULT, projected_sweeps=5),
     "sliver check": replace(DEFAULT, sliver_check=True),
 }
 COLUMNS = (

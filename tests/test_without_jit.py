@@ -85,6 +85,8 @@ def test_whole_calls_agree_with_the_jit(monkeypatch):
         ("operations/test_split.py", "template or one_round or kinds"),
         ("operations/test_collapse.py", "link or single or boundary_guard or overshoot or refuses"),
         ("operations/test_flip.py", "single or dart or duplicates or poles or sliver_check"),
+        ("operations/test_lloyd.py", "annulus or velocity or bounded or degenerate"),
+        ("operations/test_frames.py", "annulus or degenerate"),
         ("operations/test_relax.py", "formula or stiffness or only_inner"),
         ("reference/test_bvh.py", "size_of_tree or without_area or hint"),
         ("operations/test_untangle.py", "reach or left_alone or told_to"),

@@ -240,7 +240,7 @@ def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
         "--preset",
         choices=get_args(Preset),
         default="default",
-        help="fast: the published algorithm; fine: more sweeps and a closer fit",
+        help="fast: the published algorithm; even: the most even areas; fine: a closer fit",
     )
     group.add_argument(
         "--iterations", type=_at_least_one, metavar="N", help="largest number of sweeps"

@@ -24,7 +24,7 @@ __all__ = [
 
 MAX_FACES = 50_000_000
 
-Preset = Literal["default", "fast", "fine"]
+Preset = Literal["default", "even", "fast", "fine"]
 Boundary = Literal["free", "split", "fixed"]
 FeatureAngle = float | Literal["auto"] | None  # degrees
 Factors = float | Sequence[float]  # of the target length, for all sweeps or stretched over them

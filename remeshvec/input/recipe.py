@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, radians
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,20 @@ from .options import RemeshOptions
 __all__ = ["PRESETS", "Recipe", "make_recipe"]
 
 Schedule = tuple[float, ...]
+
+
+class Rounds(NamedTuple):
+    """Lloyd rounds, one after the other.
+
+    A high gain with some momentum is the fastest way to a mesh that is even nearby. A small gain with a
+    momentum near 1 shakes the mesh: defects of the valences meet and vanish, as in annealing.
+    """
+
+    number: int
+    gain: float = 3.0  # share of the way to the centroid that is added to the velocity
+    momentum: float = 0.85  # share of the velocity that stays
+    trade_angle: float = 25.0  # degrees by which opposite angles must outweigh a step of valence
+    stiffness: float = 600.0  # hold of curved ridges on their vertices
 
 
 @dataclass(frozen=True)
@@ -34,11 +48,12 @@ class Recipe:
     delaunay_ties: bool = True  # flips that keep valence restore Delaunay
     flip_passes: int = 2
     stiffness: float = 60.0  # hold of curved ridges on their vertices while relaxing
-    last_relaxations: int = 4  # relaxations in the last sweep, one before
+    last_relaxations: int = 0  # relaxations in the last sweep, one before
     project: bool = True
     projected_sweeps: int = 8  # the last sweeps, which project
+    rounds: tuple[Rounds, ...] = (Rounds(20),)  # after the sweeps
     untangle_rounds: int = 4
-    untangle_angle: float = 41.5  # degrees; triangles below it are untangled
+    untangle_angle: float = 43.8  # degrees; triangles below it are untangled
     fit_rounds: int = 0
     tol: float | None = None  # stop where a sweep changes less
     max_deviation: float | None = None  # distance from the input, in its units
@@ -57,7 +72,7 @@ class Recipe:
 # the last digits are worth nothing.
 _DEFAULT = Recipe(
     preset="default",
-    iterations=12,
+    iterations=8,
     collapse=(0.9, 0.9, 0.88, 0.87, 0.86, 0.84, 0.82, 0.8),
     split=(1.25, 1.25, 1.27, 1.28, 1.29, 1.3, 1.32, 4 / 3),
 )
@@ -74,14 +89,24 @@ PRESETS: dict[str, Recipe] = {
         flip_passes=1,
         stiffness=0.0,
         last_relaxations=1,
+        rounds=(),
         untangle_rounds=0,
     ),
     "default": _DEFAULT,
+    "even": replace(
+        _DEFAULT,
+        preset="even",
+        rounds=(
+            Rounds(460, gain=1.0, momentum=0.998, trade_angle=10.0, stiffness=1200.0),
+            Rounds(40, trade_angle=10.0),
+        ),
+        untangle_rounds=8,
+        untangle_angle=44.1,
+    ),
     "fine": replace(
         _DEFAULT,
         preset="fine",
         iterations=16,
-        last_relaxations=6,
         fit_rounds=2,
     ),
 }

@@ -26,7 +26,16 @@ from ..mesh.blocks import (
     vertex_range,
 )
 from ..mesh.edge_curves import is_feature
-from ..mesh.walk import apex_of, corners_of, end_of, next_halfedge, next_spoke
+from ..mesh.walk import (
+    apex_of,
+    corners_of,
+    end_of,
+    next_halfedge,
+    next_spoke,
+    previous_halfedge,
+)
+from .flip_gains import dot_opposite, is_good_trade, quad_of, valence_gain, violates_delaunay
+from .folds import is_folded
 from .outcomes import (
     FLIPPED,
     KEPT_DUPLICATE,
@@ -46,6 +55,7 @@ class FlipLimits(NamedTuple):
     normal_cosine: float  # cosine of the largest turn of the normals across the quad
     delaunay_ties: bool  # flip without valence gain where Delaunay is violated
     sliver_check: bool  # the worse of the two triangles must not get worse
+    trade: float = 0.0  # tangent of the angle by which Delaunay may outweigh valence; 0: not at all
 
 
 def flip_edges(
@@ -60,10 +70,12 @@ def flip_edges(
     touched = np.zeros(mesh.vertex_halfedge.size, np.uint8)
     total = np.zeros(N_FLIP_OUTCOMES, np.int64)
     for n in range(passes):
-        if n == 0:
-            _find_flips(parallel, mesh, blocks, limits.delaunay_ties, candidates)
+        if n > 0:
+            _find_again(parallel, mesh, blocks, limits, touched, candidates)
+        elif limits.trade > 0.0:
+            _find_trades(parallel, mesh, blocks, limits, candidates)
         else:
-            _find_again(parallel, mesh, blocks, limits.delaunay_ties, touched, candidates)
+            _find_flips(parallel, mesh, blocks, limits, candidates)
         if not candidates.counts.any():
             break
         tally = np.zeros((len(blocks.face) - 1, N_FLIP_OUTCOMES), np.int64)
@@ -75,7 +87,7 @@ def flip_edges(
 
 
 @threaded(per_block)
-def _find_flips(span, mesh, blocks, delaunay_ties, candidates):
+def _find_flips(span, mesh, blocks, limits, candidates):
     """List the edges to flip, by two sieves without branches, which no processor could predict.
 
     A flip takes an edge from both ends and gives one to both apexes. It gains if three of the four are
@@ -106,12 +118,66 @@ def _find_flips(span, mesh, blocks, delaunay_ties, candidates):
         for i in range(start, end):
             h = item[i]
             item[sieved] = h
-            sieved += _is_wanted(mesh, h, mesh.twin[h], delaunay_ties)
+            sieved += _is_wanted(mesh, h, mesh.twin[h], limits)
         candidates.counts[k] = sieved - start
 
 
 @threaded(per_block)
-def _find_again(span, mesh, blocks, delaunay_ties, touched, candidates):
+def _find_trades(span, mesh, blocks, limits, candidates):
+    """List the edges to flip by trades, each by one of its two faces.
+
+    Only an edge opposite an obtuse angle violates Delaunay. One that gains valence lets three of four
+    vertices be better off, so two of the three in either face.
+    """
+    item = candidates.items
+    for k in range(span[0], span[1]):
+        start = candidates.starts[k]
+        end = start
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            if mesh.origin[3 * f] == DEAD:
+                continue
+            a, b, c = corners_of(mesh.origin, f)
+            ea, eb, ec = mesh.valence_excess[a], mesh.valence_excess[b], mesh.valence_excess[c]
+            lc, la, lb = _squared_sides(mesh.X, a, b, c)
+            for i in range(3):
+                h = 3 * f + i
+                t = mesh.twin[h]
+                may_gain = _may_gain(ea, eb, ec) & (t < h)
+                item[end] = h
+                end += (t != NONE) & (may_gain | (lc > la + lb))
+                ea, eb, ec = eb, ec, ea
+                lc, la, lb = la, lb, lc
+        sieved = start
+        for i in range(start, end):
+            h = item[i]
+            t = mesh.twin[h]
+            item[sieved] = h
+            sieved += (t < h or not _is_listed(mesh, h, t)) and _is_wanted(mesh, h, t, limits)
+        candidates.counts[k] = sieved - start
+
+
+@inlined
+def _squared_sides(X, a, b, c):
+    """Squared lengths of the sides a-b, b-c and c-a."""
+    return distance_squared(X, a, b), distance_squared(X, b, c), distance_squared(X, c, a)
+
+
+@inlined
+def _may_gain(ea, eb, ec):
+    """Tell whether a flip may gain valence, from the excess at the ends of an edge and one apex."""
+    return 1 * (ea > 0) + (eb > 0) + (ec < 0) >= 2
+
+
+@inlined
+def _is_listed(mesh, h, t):
+    """Tell whether ``t``, the larger half-edge of an edge, was listed."""
+    excess = mesh.valence_excess
+    a, b, _, d = quad_of(mesh, h, t)
+    return dot_opposite(mesh, t) < 0.0 or _may_gain(excess[a], excess[b], excess[d])
+
+
+@threaded(per_block)
+def _find_again(span, mesh, blocks, limits, touched, candidates):
     """List the edges to flip around touched vertices, each by one of its two faces."""
     for k in range(span[0], span[1]):
         end = candidates.starts[k]
@@ -122,7 +188,7 @@ def _find_again(span, mesh, blocks, delaunay_ties, touched, candidates):
                 t = mesh.twin[h]
                 if t != NONE and (t < h or not _is_touched(mesh, t // 3, touched)):
                     candidates.items[end] = h
-                    end += _is_wanted(mesh, h, t, delaunay_ties)
+                    end += _is_wanted(mesh, h, t, limits)
         candidates.counts[k] = end - candidates.starts[k]
 
 
@@ -134,10 +200,15 @@ def _is_touched(mesh, f, touched):
 
 
 @inlined
-def _is_wanted(mesh, h, t, delaunay_ties):
-    """Tell whether a flip gains valence, or keeps it and restores Delaunay."""
+def _is_wanted(mesh, h, t, limits):
+    """Tell whether a flip gains valence, or keeps it and restores Delaunay, or is a good trade."""
     gain = valence_gain(mesh, h, t)
-    wanted = gain > 0 or (gain == 0 and delaunay_ties and violates_delaunay(mesh, h, t))
+    if limits.trade > 0.0:
+        wanted = gain != -1 and is_good_trade(mesh, h, t, gain, limits.trade)
+    elif gain == 0:
+        wanted = limits.delaunay_ties and violates_delaunay(mesh, h, t)
+    else:
+        wanted = gain > 0
     return wanted and not is_feature(mesh.curve[h])
 
 
@@ -168,11 +239,11 @@ def _flip_edge(mesh, h, owned, limits, touched):
     d = apex_of(mesh.origin, t)
     if not owns(owned, d):
         return NOT_OWNED
-    if not _is_wanted(mesh, h, t, limits.delaunay_ties):
+    if not _is_wanted(mesh, h, t, limits):
         return NO_LONGER_WANTED
     if duplicates_edge(mesh, c, d):
         return KEPT_DUPLICATE
-    if bends_quad(mesh, h, t, limits.normal_cosine):
+    if bends_quad(mesh, h, t, limits.normal_cosine) or folds_neighbour(mesh, h, t):
         return KEPT_NORMAL
     if limits.sliver_check and flip_makes_sliver(mesh, h, t):
         return KEPT_SLIVER
@@ -180,57 +251,6 @@ def _flip_edge(mesh, h, owned, limits, touched):
         touched[v] = 1
     _turn_edge(mesh, h, t)
     return FLIPPED
-
-
-@inlined
-def _quad_of(mesh, h, t):
-    """Return the vertices of the quad around an edge: its ends a and b, the apexes c and d."""
-    origin = mesh.origin
-    return origin[h], origin[t], apex_of(origin, h), apex_of(origin, t)
-
-
-@inlined
-def valence_gain(mesh, h, t):
-    """Fall of the summed distance from the ideal valences; negative if an end has too few edges."""
-    a, b, c, d = _quad_of(mesh, h, t)
-    excess = mesh.valence_excess
-    ea, eb, ec, ed = excess[a], excess[b], excess[c], excess[d]
-    # Each of the four comes one nearer to its ideal, or goes one farther away.
-    gain = 2 * (ea > 0) + 2 * (eb > 0) + 2 * (ec < 0) + 2 * (ed < 0) - 4
-    return -1 if min(ea, eb) <= -3 else gain
-
-
-@inlined
-def violates_delaunay(mesh, h, t):
-    """Tell whether the angles opposite the edge sum to more than pi (cotangents below 0)."""
-    dot_c = _dot_opposite(mesh, h)
-    dot_d = _dot_opposite(mesh, t)
-    if dot_c >= 0.0 and dot_d >= 0.0:  # both acute, as almost always
-        return False
-    return _cotangent(mesh, h, dot_c) + _cotangent(mesh, t, dot_d) < -1e-9
-
-
-@inlined
-def _dot_opposite(mesh, h):
-    """Scalar product of the two edges that meet opposite a half-edge."""
-    X = mesh.X
-    a, b, c = mesh.origin[h], end_of(mesh.origin, h), apex_of(mesh.origin, h)
-    return (
-        (X[a, 0] - X[c, 0]) * (X[b, 0] - X[c, 0])
-        + (X[a, 1] - X[c, 1]) * (X[b, 1] - X[c, 1])
-        + (X[a, 2] - X[c, 2]) * (X[b, 2] - X[c, 2])
-    )
-
-
-@inlined
-def _cotangent(mesh, h, dot):
-    """Cotangent of the angle opposite a half-edge; far below zero for a face without area."""
-    a, b, c = mesh.origin[h], end_of(mesh.origin, h), apex_of(mesh.origin, h)
-    nx, ny, nz = area_vector(mesh.X, a, b, c)
-    norm = sqrt(nx * nx + ny * ny + nz * nz)
-    if norm == 0.0:
-        return 0.0 if dot == 0.0 else (1e30 if dot > 0.0 else -1e30)
-    return dot / norm
 
 
 @inlined
@@ -260,7 +280,7 @@ def bends_quad(mesh, h, t, cosine):
     Comparing with the old faces instead would keep caps from flipping away: their normals are noise.
     """
     X = mesh.X
-    a, b, c, d = _quad_of(mesh, h, t)
+    a, b, c, d = quad_of(mesh, h, t)
     u = ux, uy, uz = area_vector(X, a, d, c)
     w = wx, wy, wz = area_vector(X, b, c, d)
     mean = ux + wx, uy + wy, uz + wz
@@ -275,10 +295,39 @@ def bends_quad(mesh, h, t, cosine):
 
 
 @inlined
+def folds_neighbour(mesh, h, t):
+    """Guard: a new face would be folded onto a face beside the quad, which is not so now.
+
+    On a rough ridge the quad's own normals agree within the limit, and yet trades made most of the folds
+    that a call made.
+    """
+    a, b, c, d = quad_of(mesh, h, t)
+    old_h, old_t = area_vector(mesh.X, a, b, c), area_vector(mesh.X, b, a, d)
+    new_a, new_b = area_vector(mesh.X, a, d, c), area_vector(mesh.X, b, c, d)
+    return (
+        _folds_beside(mesh, previous_halfedge(h), old_h, new_a)
+        or _folds_beside(mesh, next_halfedge(h), old_h, new_b)
+        or _folds_beside(mesh, next_halfedge(t), old_t, new_a)
+        or _folds_beside(mesh, previous_halfedge(t), old_t, new_b)
+    )
+
+
+@inlined
+def _folds_beside(mesh, h, old, new):
+    """Tell whether the face across a half-edge would be folded by a new normal on this side."""
+    g = mesh.twin[h]
+    if g == NONE:
+        return False
+    a, b, c = corners_of(mesh.origin, g // 3)
+    across = area_vector(mesh.X, a, b, c)
+    return is_folded(across, new) and not is_folded(across, old)
+
+
+@inlined
 def flip_makes_sliver(mesh, h, t):
     """Guard (optional): the worse of the two triangles would get worse."""
     X = mesh.X
-    a, b, c, d = _quad_of(mesh, h, t)
+    a, b, c, d = quad_of(mesh, h, t)
     before = min(_flip_shape(X, a, b, c), _flip_shape(X, b, a, d))
     return min(_flip_shape(X, a, d, c), _flip_shape(X, b, c, d)) < before
 
@@ -303,7 +352,7 @@ def _turn_edge(mesh, h, t):
     """
     origin = mesh.origin
     twin = mesh.twin
-    a, b, c, d = _quad_of(mesh, h, t)
+    a, b, c, d = quad_of(mesh, h, t)
     hn = next_halfedge(h)
     tn = next_halfedge(t)
     bc = twin[hn]

@@ -5,18 +5,26 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.compiler import inlined, threaded
-from ..core.geometry import area_vector
+from ..core.geometry import area_vector, point
 from ..core.vocabulary import DEAD, NONE, Blocks, FloatArray, IndexArray, Mesh
 from ..mesh.blocks import per_block
 from ..mesh.walk import corners_of
 
-__all__ = ["area_vectors", "find_flat_faces", "find_folds", "has_folds"]
+__all__ = [
+    "NO_AREA",
+    "area_vectors",
+    "find_flat_faces",
+    "find_folds",
+    "has_folds",
+    "is_folded",
+    "squared_norm",
+]
 
 # Square of the cosine of a turn of 150 degrees, from which on an edge counts as folded.
 _FOLDED_SQUARED = 0.75
 
 # Twice the area of a face without any, as a share of the squared target length.
-_NO_AREA = 1e-12
+NO_AREA = 1e-12
 
 
 def has_folds(mesh: Mesh, blocks: Blocks, parallel: bool) -> bool:
@@ -46,7 +54,7 @@ def find_folds(mesh: Mesh, vectors: FloatArray) -> IndexArray:
 def find_flat_faces(mesh: Mesh, vectors: FloatArray) -> IndexArray:
     """Return the faces without area."""
     alive = np.flatnonzero(mesh.origin[::3] != DEAD)
-    limit = _NO_AREA * mesh.X[mesh.origin[3 * alive], 3] ** 2
+    limit = NO_AREA * mesh.X[mesh.origin[3 * alive], 3] ** 2
     size = np.einsum("ij,ij->i", vectors[alive], vectors[alive])
     return alive[~(size > limit * limit)].astype(np.int32)
 
@@ -68,24 +76,26 @@ def _look(span, mesh, blocks, vectors, found):
             v = mesh.origin[3 * f]
             if v == DEAD:
                 continue
-            limit = _NO_AREA * mesh.X[v, 3] * mesh.X[v, 3]
-            size = _square(vectors, f)
-            if not size > limit * limit:
+            limit = NO_AREA * mesh.X[v, 3] * mesh.X[v, 3]
+            here = point(vectors, f)
+            if not squared_norm(here) > limit * limit:
                 found[k] = 1
             for h in range(3 * f, 3 * f + 3):
                 t = mesh.twin[h]
                 if t == NONE or t < h:
                     continue
-                g = t // 3
-                dot = (
-                    vectors[f, 0] * vectors[g, 0]
-                    + vectors[f, 1] * vectors[g, 1]
-                    + vectors[f, 2] * vectors[g, 2]
-                )
-                if dot < 0.0 and dot * dot > _FOLDED_SQUARED * size * _square(vectors, g):
+                if is_folded(here, point(vectors, t // 3)):
                     found[k] = 1
 
 
 @inlined
-def _square(vectors, f):
-    return vectors[f, 0] ** 2 + vectors[f, 1] ** 2 + vectors[f, 2] ** 2
+def is_folded(u, w):
+    """Tell whether the area vectors of the faces at an edge differ by more than 150 degrees."""
+    dot = u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
+    return dot < 0.0 and dot * dot > _FOLDED_SQUARED * squared_norm(u) * squared_norm(w)
+
+
+@inlined
+def squared_norm(u):
+    """Square of the length of a vector."""
+    return u[0] * u[0] + u[1] * u[1] + u[2] * u[2]

@@ -14,8 +14,8 @@ from math import sqrt
 
 import numpy as np
 
-from ..core.compiler import add_four, add_row, inlined, threaded
-from ..core.geometry import SHARP, area_vector, mixed_voronoi_areas, tangent_basis
+from ..core.compiler import add_row, inlined, threaded
+from ..core.geometry import mixed_voronoi_areas, tangent_basis
 from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, Mesh
 from ..mesh.blocks import (
     make_candidates,
@@ -27,13 +27,12 @@ from ..mesh.blocks import (
     vertex_range,
 )
 from ..mesh.walk import corners_of
+from .frames import STIFF_SUMS, add_normal, stiffness_along, tangent_normal
 
 __all__ = ["relax_vertices"]
 
-# Columns of the sums: weighted positions and weights, normal and its length without cancellation, normal
-# tensor (xx xy xz yy, yz; zz follows from its trace). Rows begin where cache lines do.
+# Columns of the sums without a stiffness: weighted positions and weights, then as in `frames`.
 _PLAIN_SUMS = 8
-_STIFF_SUMS = 16
 
 
 def relax_vertices(mesh: Mesh, blocks: Blocks, stiffness: float, parallel: bool) -> None:
@@ -43,7 +42,7 @@ def relax_vertices(mesh: Mesh, blocks: Blocks, stiffness: float, parallel: bool)
     """
     n = mesh.vertex_halfedge.size
     weighted = np.empty((n, 4))  # positions times weights, and weights
-    sums = np.empty((n, _STIFF_SUMS if stiffness > 0.0 else _PLAIN_SUMS))
+    sums = np.empty((n, STIFF_SUMS if stiffness > 0.0 else _PLAIN_SUMS))
     across = make_candidates(blocks.face)
     _sum_areas(parallel, mesh, blocks, weighted, across)
     for stage in stages(blocks)[1:]:
@@ -153,24 +152,10 @@ def _sum_rings_across(span, mesh, blocks, stage, stiffness, weighted, across, su
 @inlined
 def _add_face(X, weighted, a, b, c, stiffness, sums):
     """Add a face to the sums of its corners; each half-edge adds the vertex that it ends at."""
-    nx, ny, nz = area_vector(X, a, b, c)
     add_row(sums, a, weighted, b)
     add_row(sums, b, weighted, c)
     add_row(sums, c, weighted, a)
-    norm = sqrt(nx * nx + ny * ny + nz * nz)
-    add_four(sums, a, 4, nx, ny, nz, norm)
-    add_four(sums, b, 4, nx, ny, nz, norm)
-    add_four(sums, c, 4, nx, ny, nz, norm)
-    if stiffness > 0.0 and norm > 0.0:
-        scale = 1.0 / norm
-        ux, uy = nx * scale, ny * scale
-        xx, xy, xz, yy, yz = ux * nx, ux * ny, ux * nz, uy * ny, uy * nz
-        add_four(sums, a, 8, xx, xy, xz, yy)
-        add_four(sums, b, 8, xx, xy, xz, yy)
-        add_four(sums, c, 8, xx, xy, xz, yy)
-        sums[a, 12] += yz
-        sums[b, 12] += yz
-        sums[c, 12] += yz
+    add_normal(X, a, b, c, stiffness, sums)
 
 
 @threaded(per_block)
@@ -188,18 +173,10 @@ def _move(span, mesh, blocks, stiffness, sums):
 
 @inlined
 def _relaxation_step(X, v, sums, stiffness):
-    """Compute the step of a vertex in its tangent plane.
-
-    A vertex on a sharp edge has no tangent plane. It stays, or the rim of a sheet would creep inwards.
-    """
-    nx, ny, nz = sums[v, 4], sums[v, 5], sums[v, 6]
-    norm = sqrt(nx * nx + ny * ny + nz * nz)
-    if not (sums[v, 3] > 0.0 and norm > SHARP * sums[v, 7]):
+    """Compute the step of a vertex in its tangent plane; none where it has no such plane."""
+    normal = nx, ny, nz = tangent_normal(sums, v)
+    if not sums[v, 3] > 0.0 or (nx == 0.0 and ny == 0.0 and nz == 0.0):
         return 0.0, 0.0, 0.0
-    scale = 1.0 / norm
-    nx *= scale
-    ny *= scale
-    nz *= scale
     scale = 1.0 / sums[v, 3]
     dx = sums[v, 0] * scale - X[v, 0]
     dy = sums[v, 1] * scale - X[v, 1]
@@ -209,45 +186,18 @@ def _relaxation_step(X, v, sums, stiffness):
     dy -= along * ny
     dz -= along * nz
     if stiffness > 0.0:
-        return _stiffened(sums, v, (nx, ny, nz), (dx, dy, dz), stiffness)
+        return _stiffened(sums, v, normal, (dx, dy, dz), stiffness)
     return dx, dy, dz
 
 
 @inlined
 def _stiffened(sums, v, normal, step, stiffness):
-    """Damp a step where normals vary: ``(I + s Q^2)^-1 d``, Q the normal tensor in the tangent plane.
-
-    Across a curved ridge Q is large and the vertex stays on it; along the ridge it still slides.
-    """
-    nx, ny, nz = normal
-    dx, dy, dz = step
-    scale = 1.0 / sums[v, 7]
-    xx, xy, xz = sums[v, 8] * scale, sums[v, 9] * scale, sums[v, 10] * scale
-    yy, yz = sums[v, 11] * scale, sums[v, 12] * scale
-    zz = 1.0 - xx - yy
-    # The share of the tensor outside the normal; below 1e-3 the ring is flat to 2 degrees.
-    along = (
-        nx * (xx * nx + 2.0 * (xy * ny + xz * nz)) + ny * (yy * ny + 2.0 * yz * nz) + nz * zz * nz
-    )
-    if xx + yy + zz - along < 1e-3:
+    """Damp a step in the tangent plane where normals vary."""
+    m_ss, m_st, m_tt = stiffness_along(sums, v, normal, stiffness)
+    if m_ss == 1.0 and m_tt == 1.0:
         return step
-    sx, sy, sz, tx, ty, tz = tangent_basis(nx, ny, nz)
-    qs_x, qs_y, qs_z = (
-        xx * sx + xy * sy + xz * sz,
-        xy * sx + yy * sy + yz * sz,
-        xz * sx + yz * sy + zz * sz,
-    )
-    qt_x, qt_y, qt_z = (
-        xx * tx + xy * ty + xz * tz,
-        xy * tx + yy * ty + yz * tz,
-        xz * tx + yz * ty + zz * tz,
-    )
-    ss = qs_x * sx + qs_y * sy + qs_z * sz
-    st = qs_x * tx + qs_y * ty + qs_z * tz
-    tt = qt_x * tx + qt_y * ty + qt_z * tz
-    m_ss = 1.0 + stiffness * (ss * ss + st * st)
-    m_st = stiffness * st * (ss + tt)
-    m_tt = 1.0 + stiffness * (st * st + tt * tt)
+    dx, dy, dz = step
+    sx, sy, sz, tx, ty, tz = tangent_basis(normal[0], normal[1], normal[2])
     ds = dx * sx + dy * sy + dz * sz
     dt = dx * tx + dy * ty + dz * tz
     determinant = m_ss * m_tt - m_st * m_st

@@ -1,21 +1,23 @@
-"""Unfold: take back the moves that turned faces beside curves over.
+"""Unfold: take back the moves that turned faces over.
 
-The middle of a ring lies outside where a curve is concave, or where the ring hangs on an edge that must
-not be split. All vertices move at once, so a foldover shows only afterwards. Away from curves nothing is
-taken back: that would keep the folds of the input.
+All vertices move at once, so a foldover shows only afterwards. Beside curves, the middle of a ring lies
+outside where the curve is concave, or where the ring hangs on an edge that must not be split: there no
+face may turn far. Elsewhere that would keep the folds of the input: there, moves are taken back only
+where an edge has come to be folded that was not.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..core.compiler import threaded
-from ..core.geometry import area_vector, turn_exceeds
-from ..core.vocabulary import CURVE, DEAD, INNER, Blocks, FloatArray, Mesh
+from ..core.compiler import inlined, threaded
+from ..core.geometry import area_vector, point, turn_exceeds
+from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, FloatArray, Mesh
 from ..mesh.blocks import make_candidates, per_block
 from ..mesh.walk import corners_of
+from .folds import NO_AREA, area_vectors, is_folded, squared_norm
 
-__all__ = ["undo_folds"]
+__all__ = ["undo_folded_edges", "undo_folds"]
 
 # A face may turn by 60 degrees.
 _COSINE = 0.5
@@ -52,6 +54,63 @@ def undo_folds(mesh: Mesh, blocks: Blocks, before: FloatArray, parallel: bool) -
         total += int(count.sum())
 
 
+def undo_folded_edges(mesh: Mesh, blocks: Blocks, before: FloatArray, parallel: bool) -> int:
+    """Put back the inner vertices at edges that moves have folded, and of faces that lost their area.
+
+    Returns how many; repeats as `undo_folds`, and takes the same positions. No edge may have been flipped
+    since.
+    """
+    total = 0
+    marked = np.zeros(mesh.vertex_halfedge.size, np.uint8)
+    while True:
+        vectors = area_vectors(mesh, blocks, parallel)
+        found = np.zeros(len(blocks.face) - 1, np.int64)
+        _find_folded_edges(parallel, mesh, blocks, before, vectors, marked, found)
+        if not found.any():
+            return total
+        count = np.zeros(len(found), np.int64)
+        _put_back(parallel, mesh, blocks, before, marked, count)
+        if not count.any():
+            return total
+        total += int(count.sum())
+
+
+@threaded(per_block)
+def _find_folded_edges(span, mesh, blocks, before, vectors, marked, found):
+    """Mark the vertices around edges that are folded now, and the corners of faces without area.
+
+    Blocks may mark the same vertex, with the same value.
+    """
+    for k in range(span[0], span[1]):
+        for f in range(blocks.face[k], blocks.face[k + 1]):
+            a, b, c = corners_of(mesh.origin, f)
+            if a == DEAD:
+                continue
+            here = point(vectors, f)
+            limit = (NO_AREA * mesh.X[a, 3] * mesh.X[a, 3]) ** 2
+            if (
+                not squared_norm(here) > limit
+                and squared_norm(area_vector(before, a, b, c)) > limit
+            ):
+                _mark_corners(mesh, f, marked)
+                found[k] += 1
+            for h in range(3 * f, 3 * f + 3):
+                t = mesh.twin[h]
+                if t != NONE and is_folded(here, point(vectors, t // 3)):
+                    d, e, g = corners_of(mesh.origin, t // 3)
+                    there = area_vector(before, d, e, g)
+                    if not is_folded(area_vector(before, a, b, c), there):
+                        _mark_corners(mesh, f, marked)
+                        found[k] += 1
+
+
+@inlined
+def _mark_corners(mesh, f, marked):
+    """Mark the corners of a face."""
+    for v in corners_of(mesh.origin, f):
+        marked[v] = 1
+
+
 @threaded(per_block)
 def _list_faces_at_curves(span, mesh, blocks, faces):
     """List the faces with a vertex on a curve."""
@@ -74,9 +133,7 @@ def _find_folds(span, mesh, blocks, before, faces, marked, found):
             old = ux, uy, uz = area_vector(before, a, b, c)
             new = area_vector(mesh.X, a, b, c)
             if ux * ux + uy * uy + uz * uz > 0.0 and turn_exceeds(old, new, _COSINE):
-                marked[a] = 1
-                marked[b] = 1
-                marked[c] = 1
+                _mark_corners(mesh, faces.items[i], marked)
                 found[k] += 1
 
 

@@ -1,11 +1,8 @@
 """Untangle: move the vertices of the worst triangles until these are acceptable.
 
 Relaxation evens out areas, and now and then makes a bad triangle. Here only the corners of such
-triangles move, each to where the worst triangle of its one-ring is best: a pattern search in 8 directions
-of the tangent plane. There are two costs. `untangle_vertices` asks for the smallest angle;
-`approach_vertices` for the largest distance between a centroid and the reference surface, and for the
-largest circumcircle in target lengths, which bounds how far the triangle's points lie from a curved
-surface. A move owns the closed one-ring of its vertex.
+triangles move, each to where the smallest angle of its one-ring is largest: a pattern search in 8
+directions of the tangent plane. A move owns the closed one-ring of its vertex.
 """
 
 from __future__ import annotations
@@ -32,7 +29,7 @@ from ..mesh.blocks import (
 from ..mesh.walk import corners_of, end_of, next_spoke
 from ..reference.bvh import point_on_face, walk_to_face
 
-__all__ = ["approach_vertices", "untangle_vertices"]
+__all__ = ["untangle_vertices"]
 
 # Hubs with more spokes are left alone.
 _CAPACITY = 64
@@ -55,7 +52,6 @@ class Search(NamedTuple):
 
     on_surface: bool  # trial positions are walked to the reference surface
     limit: float  # cost at which a ring is good enough
-    weight: float  # factor of squared distances in the cost; 0: the cost is that of angles
 
 
 def untangle_vertices(
@@ -81,34 +77,13 @@ def untangle_vertices(
         bad, near = np.zeros(n, np.uint8), np.zeros(n, np.uint8)
         _mark_bad_faces(parallel, mesh, blocks, limit, moved, bad, near)
         _list_marked(parallel, mesh, blocks, bad, near, candidates)
-        search = Search(on_surface, limit, 0.0)
+        search = Search(on_surface, limit)
         moved = _search_rings(mesh, blocks, tree, search, candidates, parallel)
         n_moved = int(np.count_nonzero(moved))
         if not n_moved:
             break
         total += n_moved
     return total
-
-
-def approach_vertices(
-    mesh: Mesh,
-    blocks: Blocks,
-    tree: Tree,
-    on_surface: bool,
-    limit: float,
-    distance: float,
-    parallel: bool,
-) -> int:
-    """Improve rings with a face whose centroid is farther than a distance from the reference surface.
-
-    ``limit`` is a squared circumradius in squared target lengths that costs as much as the distance.
-    Returns how many vertices moved.
-    """
-    candidates = make_candidates(blocks.vertex)
-    search = Search(on_surface, limit, limit / distance**2)  # both costs against one limit
-    _find_far_rings(parallel, mesh, blocks, tree, search, candidates)
-    moved = _search_rings(mesh, blocks, tree, search, candidates, parallel)
-    return int(np.count_nonzero(moved))
 
 
 def _search_rings(
@@ -161,31 +136,6 @@ def _list_marked(span, mesh, blocks, bad, near, candidates):
         candidates.counts[k] = end - candidates.starts[k]
 
 
-@threaded(per_block)
-def _find_far_rings(span, mesh, blocks, tree, search, candidates):
-    """List the inner vertices whose ring costs more than the limit.
-
-    Only a distance makes a ring bad, a large circle alone does not: the surface may be flat there.
-    """
-    everywhere = 0, mesh.vertex_halfedge.size
-    for k in range(span[0], span[1]):
-        ring = np.empty((_CAPACITY, 3))
-        end = candidates.starts[k]
-        for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
-            if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] != INNER:
-                continue
-            n = _copy_ring(mesh, v, everywhere, ring)
-            if n > 0:
-                p = point(mesh.X, v)
-                if (
-                    _cost(ring, n, p, p, search.weight, 0.0, tree, mesh.birth[v] // 3)
-                    > search.limit
-                ):
-                    candidates.items[end] = v
-                    end += 1
-        candidates.counts[k] = end - candidates.starts[k]
-
-
 @threaded(per_stage_block)
 def _untangle(span, mesh, blocks, stage, tree, search, candidates, moved):
     """Move the candidates whose closed one-ring the blocks of a stage own."""
@@ -224,12 +174,11 @@ def _copy_ring(mesh, v, owned, ring):
 def _search(mesh, v, ring, n, tree, search):
     """Search for the place of a vertex with the lowest cost; returns 1 if the vertex moved."""
     home = point(mesh.X, v)
-    scale = 1.0 / mesh.X[v, 3] ** 2
     length, basis = _tangent_plane(ring, n, home)
     if length == 0.0:
         return 0
     p, face = home, mesh.birth[v] // 3
-    best = _cost(ring, n, p, home, search.weight, scale, tree, face)
+    best = _cost(ring, n, p, home)
     step = _FIRST_STEP
     moved = 0
     for _ in range(_SEARCH_ROUNDS):
@@ -238,7 +187,7 @@ def _search(mesh, v, ring, n, tree, search):
         better_p, better_face, better = p, face, best
         for i in range(8):
             q, f = _trial(tree, p, face, basis, step * length, i, search.on_surface)
-            trial = _cost(ring, n, q, home, search.weight, scale, tree, f)
+            trial = _cost(ring, n, q, home)
             if trial < better:
                 better_p, better_face, better = q, f, trial
         if better < best:
@@ -287,8 +236,8 @@ def _trial(tree, p, face, basis, step, i, on_surface):
 
 
 @inlined
-def _cost(ring, n, p, home, weight, scale, tree, face):
-    """Cost of a ring around ``p``: that of its worst triangle, by angle or, with a weight, by distance.
+def _cost(ring, n, p, home):
+    """Cost of a ring around ``p``: the cosine of its smallest angle.
 
     Refused where a face has no area or turns over against the ring around ``home``.
     """
@@ -303,8 +252,6 @@ def _cost(ring, n, p, home, weight, scale, tree, face):
         cost = _angle_cost(uu, ww, uw)
         if not cost < 1.0:
             return _REFUSED
-        if weight > 0.0:
-            cost = _distance_cost(p, u, w, weight, scale, tree, face)
         worst = max(worst, cost)
         if (x != home[0] or y != home[1] or z != home[2]) and _turns_over(ring, n, i, home, u, w):
             return _REFUSED
@@ -330,24 +277,6 @@ def _angle_cost(uu, ww, uw):
     if uu <= ww:
         return (ww - uw) / sqrt(ww * rr)
     return (uu - uw) / sqrt(uu * rr)
-
-
-@inlined
-def _distance_cost(p, u, w, weight, scale, tree, face):
-    """Larger of the weighted squared distance of a centroid from the surface and a scaled circumradius.
-
-    The triangle has corners ``p``, ``p + u`` and ``p + w``.
-    """
-    x, y, z = p
-    ux, uy, uz = u
-    wx, wy, wz = w
-    centroid = x + (ux + wx) / 3.0, y + (uy + wy) / 3.0, z + (uz + wz) / 3.0
-    _, _, _, d = walk_to_face(tree, centroid, face)
-    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-    uu, ww = _dot(u, u), _dot(w, w)
-    rr = uu + ww - 2.0 * _dot(u, w)
-    radius = 0.25 * uu * ww * rr / (nx * nx + ny * ny + nz * nz)
-    return max(weight * d, scale * radius)
 
 
 @inlined

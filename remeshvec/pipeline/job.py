@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.vocabulary import DEAD, EQUILATERAL_AREA, LARGEST_MESH, FloatArray, Mesh
+from ..core.vocabulary import EQUILATERAL_AREA, LARGEST_MESH, FloatArray, Mesh
 from ..errors import OptionError
 from ..input.constraints import Constraints
 from ..input.prepare import Prepared
@@ -17,14 +16,15 @@ from ..input.recipe import Recipe
 from ..reference.build import FeaturedReference, build_reference
 from ..sizing.adaptive import Adaptive
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
+from ..sweeps.counts import count_elements
 from ..sweeps.deviation import DeviationCheck
-from ..sweeps.finish import finish, has_finish, measure_deviation
+from ..sweeps.finish import deviation_of, finish, has_finish
 from ..sweeps.flaws import CrossingCheck, FoldCheck, count_new_crossings, count_new_flaws
 from ..sweeps.guard import Check, Guard, HoldingGuard
 from ..sweeps.loop import Stop, run_sweeps
 from ..sweeps.mending import mend_folds
 from ..sweeps.monitor import Monitor
-from ..sweeps.plan import Adaptation, Plan, make_schedule
+from ..sweeps.plan import Adaptation, Count, Plan, make_schedule
 from ..sweeps.work import Work, is_large
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
@@ -71,8 +71,7 @@ class Remeshed:
 
     def count(self, noun: str) -> int:
         """Count faces or vertices."""
-        alive = self.mesh.origin[::3] if noun == "faces" else self.mesh.vertex_halfedge
-        return int(np.count_nonzero(alive != DEAD))
+        return count_elements(self.mesh, noun)
 
     def count_held(self) -> int:
         """Count faces that had to stay."""
@@ -119,8 +118,8 @@ class Job:
             prepared.scale,
             sizing.gradation,
             _adaptation(prepared, sizing),
-            sizing.max_faces,
-            _most_faces(max(sizing.max_faces, n_faces)),
+            max_faces=sizing.max_faces,
+            most_faces=_most_faces(max(sizing.max_faces, n_faces)),
         )
 
     def run_once(self) -> Remeshed:
@@ -145,7 +144,7 @@ class Job:
         swept = self._without_flaws(meshes.pop(), before, featured)
         work, stop, n_flaws = swept.work, swept.stop, swept.n_flaws
         is_compact = has_finish(work)
-        deviation = measure_deviation(work)
+        deviation = deviation_of(work)
         missed = _missed(deviation, self.recipe.max_deviation, self.sizing.L)
         return Remeshed(
             work.mesh,
@@ -195,9 +194,9 @@ class Job:
         return replace(swept, n_flaws=n_flaws, n_crossings=n_crossings)
 
     def _may_mend(self, work: Work) -> bool:
-        """Tell whether edges may be changed after the last step."""
+        """Tell whether edges may be changed after the last step: no bound or count says otherwise."""
         plan = self.plan
-        bound = plan.max_deviation is not None or plan.adaptation is not None
+        bound = plan.max_deviation is not None or plan.adaptation is not None or plan.count
         return not (bound or work.featured.on_non_manifold is not None or self.monitor.is_cancelled)
 
     def _count_flaws(self, before: Mesh, after: Mesh) -> int:
@@ -216,7 +215,8 @@ class Job:
         if bound is not None:
             checks = (*checks, DeviationCheck(featured, bound, work.is_parallel))
         guard = HoldingGuard(checks, work.is_parallel) if checks else Guard()
-        stop = run_sweeps(work, make_schedule(self.recipe), guard)
+        schedule = make_schedule(self.recipe, self.plan.adaptation is not None)
+        stop = run_sweeps(work, schedule, guard)
         if has_finish(work):
             finish(work, guard)
         return Swept(work, stop, self.monitor.counts, self._count_flaws(before, work.mesh))
@@ -288,12 +288,18 @@ def _missed(deviation: dict[str, float], bound: float | None, L: Lengths | None)
 
 
 def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
-    """Remesh with one length after another until the count is met within 2 %."""
+    """Remesh with one length after another until the count is met.
+
+    Each try that comes near meets it by splits or collapses, see `sweeps.counts`. Where edges must stay,
+    2 % is near enough.
+    """
     faces = wanted if noun == "faces" else 2 * wanted
     if faces > job.sizing.max_faces:
         raise OptionError(
             f"n_{noun} = {wanted:,} is more than max_faces = {job.sizing.max_faces:,}"
         )
+    goal = Count(noun, wanted)
+    job.plan = replace(job.plan, count=goal)
     L = sqrt(job.size.area / faces / EQUILATERAL_AREA) / job.prepared.scale
     best = None
     for _ in range(_TRIES):
@@ -307,7 +313,7 @@ def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
         L *= min(2.0, max(0.5, sqrt(max(count - held, 1) / max(wanted - held, 1))))
     assert best is not None
     count = best.count(noun)
-    if abs(count - wanted) <= _CLOSE_ENOUGH * wanted:
+    if abs(count - wanted) < goal.per_edge:
         return best
     missed = f"{count:,} {noun} are as near to {wanted:,} as {_TRIES} tries came"
     return replace(best, stop=f"{best.stop}; {missed}")

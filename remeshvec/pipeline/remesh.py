@@ -89,8 +89,8 @@ def remesh(
     return_result : bool
         With a mesh object, return a pair of the new object and the `RemeshResult`.
     n_faces, n_vertices : int, optional
-        Number of faces or vertices instead of ``L``, met within 2 % where the shape allows it;
-        ``report.stop`` says where it does not.
+        Number of faces or vertices instead of ``L``. Vertices are met exactly, faces within one: a closed
+        mesh has an even number. ``report.stop`` says where edges that must stay do not allow it.
     gradation : float
         Largest ratio of the target lengths at the ends of an edge, where ``L`` varies.
     max_deviation : float, optional
@@ -119,9 +119,11 @@ def remesh(
         ``"free"``: boundary vertices slide along the boundary of the input, corners stay. ``"split"``:
         boundary vertices of the input stay, long edges between them are split. ``"fixed"``: boundary
         edges stay.
-    preset : {"default", "fast", "fine"}
-        ``"default"``: twelve sweeps with loosening thresholds, vertices on the input. ``"fast"``: the
-        published algorithm, five sweeps. ``"fine"``: sixteen sweeps and the fit.
+    preset : {"default", "even", "fast", "fine"}
+        ``"default"``: eight sweeps with loosening thresholds, then twenty rounds that move vertices to
+        the centroids of their cells; vertices on the input. ``"even"``: five hundred rounds, for areas
+        as even as can be. ``"fast"``: the published algorithm, five sweeps. ``"fine"``: sixteen sweeps,
+        twenty rounds, and the fit.
     iterations : int, optional
         Sweeps at most; threshold schedules are stretched over them.
     split, collapse : float or sequence of float, optional
@@ -136,7 +138,7 @@ def remesh(
         Whether vertices end on the input surface; True by default. ``False`` is the algorithm as
         published, which lets them drift.
     untangle_angle : float, optional
-        Degrees; triangles with a smaller angle are improved at the end. 41.5 by default; the preset
+        Degrees; triangles with a smaller angle are improved at the end. 43.8 by default; the preset
         ``"fast"`` does so only if asked.
     fit : bool, optional
         Let vertices leave the input by up to 0.2 L so that faces straddle it: less RMS
@@ -154,8 +156,9 @@ def remesh(
     threads : int, optional
         Threads to use at most; all by default. Meshes below 50,000 faces use one.
     callback : callable, optional
-        Called as ``callback(sweep, phase, count)`` after each phase; returning False (Python's or
-        NumPy's; not None or 0) ends the call with the mesh as it is then.
+        Called as ``callback(sweep, phase, count)`` after each phase, and as phase ``"even out"`` in the
+        rounds after the last sweep; returning False (Python's or NumPy's; not None or 0) ends the call
+        with the mesh as it is then.
 
     Returns
     -------

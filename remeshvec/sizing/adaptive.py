@@ -34,9 +34,10 @@ class Adaptive:
     On a surface with a largest absolute principal curvature ``k``, an edge gets the length
     ``sqrt(6 tolerance / k - 3 tolerance^2)``: the middle of an equilateral triangle of that size, with
     its corners on a sphere of curvature ``k``, is off by ``tolerance`` [Dunyach et al. 2013, section 3].
-    Lengths are for 0.9 of the tolerance, shortened where they turn out too long, and the faces that are
-    still off are moved and split at the end: on a smooth surface all are within the tolerance, on one
-    that is rough at that scale not all. ``report.deviation`` says; ``max_deviation`` is a bound.
+    Lengths are for 0.9 of the tolerance, and shortened between sweeps where they turn out too long: on a
+    smooth surface nearly all of it ends within the tolerance, on one that is rough at that scale less.
+    Nothing is split at the end, where it would leave slivers. ``report.deviation``
+    says; ``max_deviation`` is a bound.
 
     Parameters
     ----------

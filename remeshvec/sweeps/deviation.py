@@ -6,43 +6,61 @@ import numpy as np
 
 from ..core.vocabulary import (
     DEAD,
-    FROZEN,
     HELD,
-    NON_MANIFOLD,
     NONE,
     FloatArray,
     IndexArray,
     Mesh,
+    Tree,
 )
-from ..features.polyline import find_siblings
 from ..reference.build import FeaturedReference
 from ..reference.bvh import closest_faces
-from .guard import LazyTree, Offenders, lazy_tree, tree_of
+from .guard import LazyTree, Offenders, tree_of
 
-__all__ = ["DeviationCheck", "edges_to_refine", "sample_mesh", "shortened_lengths"]
+__all__ = [
+    "DeviationCheck",
+    "measure_deviation",
+    "sample_mesh",
+    "shortened_lengths",
+]
 
-# Samples of a face lie on a grid of so many steps along every side.
-_STEPS = 5
-_GRID = np.array(
-    [[i, j, _STEPS - i - j] for i in range(_STEPS + 1) for j in range(_STEPS + 1 - i)], float
-)
-_GRID /= _STEPS
+
+def _grid(steps: int) -> FloatArray:
+    """Barycentric weights of samples of a face, on a grid of so many steps along every side."""
+    weights = [[i, j, steps - i - j] for i in range(steps + 1) for j in range(steps + 1 - i)]
+    return np.array(weights, float) / steps
+
+
+_GRID = _grid(5)
+_MIDDLE = np.array([[0.4, 0.4, 0.2]])  # one of them, near the centroid
+
+# For lengths that are corrected: no corners, which lie on the input.
+_COARSE = _grid(3)
+_COARSE = _COARSE[_COARSE.max(axis=1) < 1.0]
 
 # Samples must keep this share of the distance: between them it may be a little more.
 _SAMPLED_SHARE = 0.8
 
 
-def sample_mesh(X: FloatArray, F: IndexArray) -> tuple[FloatArray, IndexArray]:
-    """Sample every face of a mesh at 21 points: its corners, four on each side and six inside.
+# Vertices of the input that are farther from the mesh than so many tolerances: a tip was lost.
+_LOST = 2.0
+
+
+def sample_mesh(
+    X: FloatArray, F: IndexArray, grid: FloatArray = _GRID
+) -> tuple[FloatArray, IndexArray]:
+    """Sample every face of a mesh, at 21 points: its corners, four on each side and six inside.
+
+    ``grid`` holds the barycentric weights of other points (k, 3).
 
     Returns
     -------
-    points : (21 m, 3) float64
+    points : (k m, 3) float64
         Those of a face together.
-    face : (21 m,) int32
+    face : (k m,) int32
     """
-    points = np.einsum("kc,mcx->mkx", _GRID, X[F, :3]).reshape(-1, 3)
-    return points, np.repeat(np.arange(len(F), dtype=np.int32), len(_GRID))
+    points = np.einsum("kc,mcx->mkx", grid, X[F, :3]).reshape(-1, 3)
+    return points, np.repeat(np.arange(len(F), dtype=np.int32), len(grid))
 
 
 class DeviationCheck:
@@ -96,11 +114,37 @@ class DeviationCheck:
         far = np.concatenate([points[to_input > limit], self.samples[from_input > limit]])
         return Offenders(far, np.empty(0, np.int32))
 
-    def measure(self, mesh: Mesh) -> dict[str, float]:
-        """Largest distance of a sample, each way."""
-        tree = lazy_tree(mesh, self.parallel)
-        _, to_input, from_input = self.distances(mesh, tree, 0.0)
-        return {"to_input": float(to_input.max()), "from_input": float(from_input.max())}
+
+def measure_deviation(mesh: Mesh, featured: FeaturedReference, parallel: bool) -> dict[str, float]:
+    """Largest distance of a sample, each way."""
+    reference = featured.reference
+    alive = mesh.origin[::3] != DEAD
+    F, G = mesh.origin.reshape(-1, 3)[alive], reference.origin.reshape(-1, 3)
+    hint = _hints(mesh, F, mesh.source[alive])
+    anywhere = np.full(len(G), NONE, np.int32)
+    tree = tree_of(mesh, parallel)
+    return {
+        "to_input": _largest_distance(reference.tree, mesh.X, F, hint, parallel),
+        "from_input": _largest_distance(tree, reference.X, G, anywhere, parallel),
+    }
+
+
+def _largest_distance(
+    tree: Tree, X: FloatArray, F: IndexArray, hint: IndexArray, parallel: bool
+) -> float:
+    """Largest distance of the samples of faces from a surface.
+
+    One sample per face says which faces may have a farther one: distances of two points differ by no
+    more than theirs from each other. Of those the ones nearer than the farthest so far need no search.
+    """
+    middle, _ = sample_mesh(X, F, _MIDDLE)
+    _, distance = closest_faces(tree, middle, hint, 0.0, parallel)
+    worst = float(distance.max())
+    reach = np.linalg.norm(X[F, :3] - middle[:, None], axis=2).max(axis=1)
+    far = np.flatnonzero(distance + reach > worst)
+    points, face = sample_mesh(X, F[far])
+    _, distance = closest_faces(tree, points, hint[far][face], worst, parallel)
+    return max(worst, float(distance.max(initial=0.0)))
 
 
 def _worst_distances(
@@ -108,7 +152,7 @@ def _worst_distances(
 ) -> FloatArray:
     """Largest distance of a sample of each face of a compact mesh from the input."""
     F = mesh.origin.reshape(-1, 3)
-    points, face = sample_mesh(mesh.X, F)
+    points, face = sample_mesh(mesh.X, F, _COARSE)
     hint = _hints(mesh, F, mesh.source)[face]
     _, distance = closest_faces(featured.reference.tree, points, hint, trust, parallel)
     return distance.reshape(len(F), -1).max(axis=1)
@@ -117,46 +161,20 @@ def _worst_distances(
 def shortened_lengths(
     mesh: Mesh, featured: FeaturedReference, tolerance: float, parallel: bool
 ) -> FloatArray:
-    """Target lengths at the vertices of the input, shorter where faces are off by more than a tolerance.
+    """Target lengths at the vertices of the input, shorter where the surfaces are too far apart.
 
-    The error goes with the square of the length; a length falls by no more than 0.7 at a time.
+    That is where faces of the mesh are off by more than a tolerance, or vertices of the input by more
+    than two: there a tip was lost. The error goes with the square of the length; a length falls by no
+    more than 0.7 at a time.
     """
     worst = _worst_distances(mesh, featured, tolerance, parallel)
     X = featured.reference.X
     anywhere = np.full(len(X), NONE, np.int32)
-    face, _ = closest_faces(tree_of(mesh, parallel), X[:, :3], anywhere, 0.0, parallel)
-    share = tolerance / np.maximum(worst[face], tolerance)
+    tree = tree_of(mesh, parallel)
+    face, distance = closest_faces(tree, X[:, :3], anywhere, tolerance, parallel)
+    lost = np.where(distance > _LOST * tolerance, distance, 0.0)
+    share = tolerance / np.maximum(np.maximum(worst[face], lost), tolerance)
     return np.asarray(X[:, 3] * np.maximum(np.sqrt(share), 0.7))
-
-
-def edges_to_refine(
-    mesh: Mesh, featured: FeaturedReference, tolerance: float, parallel: bool
-) -> IndexArray:
-    """Longest edge of every face with a sample farther than ``tolerance`` from the input.
-
-    Only where it is longer than its target: shorter ones follow ridges of the input's own faces, which
-    splits come no nearer to.
-
-    Returns
-    -------
-    (k,) int32
-        Half-edges that may be split; on seams, those of all sheets.
-    """
-    faces = np.flatnonzero(_worst_distances(mesh, featured, tolerance, parallel) > tolerance)
-    F = mesh.origin.reshape(-1, 3)
-    corners = mesh.X[F[faces], :3]
-    length = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2)
-    length[mesh.curve.reshape(-1, 3)[faces] == FROZEN] = 0.0
-    edges = 3 * faces + length.argmax(axis=1)
-    edges = edges[length.max(axis=1) > mesh.X[F[faces], 3].mean(axis=1)]
-    if featured.on_non_manifold is not None:
-        on_non_manifold = np.flatnonzero(mesh.curve >= NON_MANIFOLD).astype(np.int32)
-        members, group = find_siblings(mesh.X, mesh.origin, on_non_manifold)
-        chosen = np.isin(members, edges)
-        if chosen.any():
-            chosen = np.logical_or.reduceat(chosen, group[:-1])
-            edges = np.union1d(edges, members[np.repeat(chosen, np.diff(group))])
-    return edges.astype(np.int32)
 
 
 def _hints(mesh: Mesh, F: IndexArray, source: IndexArray) -> IndexArray:

@@ -21,14 +21,14 @@ from ..operations.relax import relax_vertices
 from ..operations.siblings import collapse_siblings
 from ..operations.slide import slide_vertices
 from ..operations.split import MAX_ROUNDS, SPARE, split_long_edges
-from ..operations.unfold import undo_folds
+from ..operations.unfold import undo_folded_edges, undo_folds
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import find_non_manifold_edges, non_manifold_copies
 from ..sizing.target_lengths import bound_gradation
 from .plan import Sweep
 from .work import Work
 
-__all__ = ["collapse", "flip", "project", "relax", "split"]
+__all__ = ["collapse", "flip", "project", "refresh_lengths", "relax", "split"]
 
 Phase = Callable[[Work, Sweep], None]
 
@@ -140,7 +140,8 @@ def flip(work: Work, sweep: Sweep) -> None:
 def relax(work: Work, sweep: Sweep) -> None:
     """Move vertices in their tangent planes, and those on curves along them."""
     mesh, blocks, reference = work.mesh, work.blocks, work.featured.reference
-    work.before = mesh.X.copy() if work.featured.has_curves or work.measures_steps else None
+    is_kept = work.featured.has_curves or work.measures_steps or sweep.unfolds
+    work.before = mesh.X.copy() if is_kept else None
     for _ in range(sweep.relaxations):
         slide_vertices(mesh, blocks, reference, work.is_parallel)
         relax_vertices(mesh, blocks, sweep.stiffness, work.is_parallel)
@@ -154,15 +155,23 @@ def project(work: Work, sweep: Sweep) -> None:
         project_vertices(mesh, blocks, reference, WALK_TRUST, work.is_parallel)
     if work.featured.has_curves and work.before is not None:
         undo_folds(mesh, blocks, work.before, work.is_parallel)
-    if work.varies:
-        weights = read_lengths(mesh, blocks, reference, work.is_parallel)
-        if work.featured.long_rims is not None:
-            corners = reference.origin.reshape(-1, 3)[mesh.birth // 3]
-            work.featured.long_rims.lengthen(mesh, corners, weights)
-        bound_gradation(mesh, work.plan.gradation, non_manifold_copies(mesh, work.featured))
+    if sweep.unfolds and work.before is not None:
+        undo_folded_edges(mesh, blocks, work.before, work.is_parallel)
+    refresh_lengths(work)
     if work.measures_steps and work.before is not None:
         work.step = _mean_step(mesh, work.before)
     work.before = None
+
+
+def refresh_lengths(work: Work) -> None:
+    """Read target lengths from the input where vertices lie now, if they vary."""
+    if not work.varies:
+        return
+    mesh, reference, rims = work.mesh, work.featured.reference, work.featured.long_rims
+    weights = read_lengths(mesh, work.blocks, reference, work.is_parallel)
+    if rims is not None:
+        rims.lengthen(mesh, reference.origin.reshape(-1, 3)[mesh.birth // 3], weights)
+    bound_gradation(mesh, work.plan.gradation, non_manifold_copies(mesh, work.featured))
 
 
 def _mean_step(mesh: Mesh, before: FloatArray) -> float:

@@ -96,7 +96,7 @@ def _length(rng: Generator, V: np.ndarray, F: np.ndarray) -> Any:
 def _options(rng: Generator, V: np.ndarray, F: np.ndarray) -> dict[str, Any]:
     m, n = len(F), len(V)
     maybe: dict[str, tuple[float, Callable[[], Any]]] = {
-        "preset": (0.6, lambda: str(rng.choice(["fast", "fine"]))),
+        "preset": (0.6, lambda: str(rng.choice(["fast", "fine", "even"]))),
         "n_faces": (0.04, lambda: size(rng, 4, 3000)),
         "n_vertices": (0.02, lambda: size(rng, 4, 1500)),
         "gradation": (0.1, lambda: float(rng.uniform(1.05, 3))),

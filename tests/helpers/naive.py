@@ -150,6 +150,17 @@ def violates_delaunay(V, F, a: int, b: int) -> bool:
     return sum(angle(V[c], V[a], V[b]) for c in find_tips) > np.pi + 1e-9
 
 
+def excess(V, F, a: int, b: int) -> float:
+    """Degrees by which the angles opposite a-b sum to more than a half turn."""
+    apexes = [(set(f) - {a, b}).pop() for f in tuples(F) if {a, b} <= set(f)]
+    return float(np.degrees(sum(angle(V[c], V[a], V[b]) for c in apexes)) - 180)
+
+
+def is_folded(u, w) -> bool:
+    """Whether two area vectors differ by more than 150 degrees."""
+    return u @ w < 0 and (u @ w) ** 2 > 0.75 * (u @ u) * (w @ w)
+
+
 # --- formulas ------------------------------------------------------------------------------------
 
 
@@ -197,6 +208,36 @@ def relaxed(V, F, *, stiffness=0.0, lengths=None, still=()) -> np.ndarray:
         g = sum(weights[w] * V[w] for w in ring[v]) / sum(weights[w] for w in ring[v])
         result[v] += tangential(V, F, v, g - V[v], stiffness)
     return result
+
+
+def centroid_steps(V, F, lengths=None) -> np.ndarray:
+    """From every vertex to the centroid of its Voronoi cell, clipped where a triangle is obtuse.
+
+    Half cell by half cell: corner, midpoint of a side, circumcentre. Where lengths are given, each has
+    the density that `lloyd` says.
+    """
+    moments, weights = np.zeros((len(V), 3)), np.zeros(len(V))
+    for f in tuples(F):
+        centre = circumcentre(*(V[v] for v in f))
+        for a, b, c in ((f[i], f[i - j], f[i + j - 3]) for i in range(3) for j in (1, 2)):
+            middle = (V[a] + V[b]) / 2
+            weight = np.linalg.norm(np.cross(middle - V[a], centre - V[a])) / 2
+            if lengths is not None:
+                weight *= (0.551 * lengths[a] + 0.321 * lengths[b] + 0.128 * lengths[c]) ** -4
+            moments[a] += weight * (V[a] + middle + centre) / 3
+            weights[a] += weight
+    return moments / weights[:, None] - V
+
+
+def circumcentre(a, b, c) -> np.ndarray:
+    """Centre of the circle through three points; in an obtuse triangle, middle of the longest side."""
+    for p, q, r in ((a, b, c), (b, c, a), (c, a, b)):
+        if (q - p) @ (r - p) <= 0:
+            return (q + r) / 2
+    # As far from a as from b and from c, and in their plane.
+    n = np.cross(b - a, c - a)
+    rows = np.stack([b - a, c - a, n])
+    return a + np.linalg.solve(rows, [(b - a) @ (b - a) / 2, (c - a) @ (c - a) / 2, 0.0])
 
 
 def tangential(V, F, v: int, step, stiffness: float) -> np.ndarray:

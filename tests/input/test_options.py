@@ -33,7 +33,7 @@ def test_presets_rise_in_effort():
     assert fast.iterations < default.iterations < fine.iterations
     assert default.fit_rounds == 0 < fine.fit_rounds
     assert all(o.project and o.foldover == 20 for o in (fast, default, fine))
-    assert set(PRESETS) == {"fast", "default", "fine"}
+    assert set(PRESETS) == {"fast", "default", "even", "fine"}
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -167,5 +167,5 @@ def test_bad_options_are_named(overrides, message):
 
 @pytest.mark.parametrize("preset", ["quick", "", "DEFAULT", None, 3, ["fast"], {}])
 def test_unknown_presets(preset):
-    with pytest.raises(OptionError, match="preset must be one of fast, default, fine"):
+    with pytest.raises(OptionError, match="preset must be one of fast, default, even, fine"):
         options(preset)

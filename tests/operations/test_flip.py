@@ -24,9 +24,9 @@ from remeshvec.operations.flip import (
     bends_quad,
     duplicates_edge,
     flip_edges,
-    valence_gain,
-    violates_delaunay,
+    folds_neighbour,
 )
+from remeshvec.operations.flip_gains import is_good_trade, valence_gain, violates_delaunay
 from remeshvec.operations.outcomes import (
     FLIPPED,
     KEPT_DUPLICATE,
@@ -68,6 +68,53 @@ def test_delaunay_by_angle(degrees):
     mesh = built(V, [[0, 1, 2], [1, 0, 3]])
     h = half_edge(mesh, 0, 1)
     assert violates_delaunay(mesh, h, int(mesh.twin[h])) == (degrees > 90)
+
+
+TRADE = 25.0
+TRADES = STRICT._replace(trade=np.tan(np.radians(TRADE)))
+
+
+@pytest.mark.parametrize("gain", [-4, -2, 0, 2, 4])
+def test_a_trade_weighs_angles_against_valences(gain):
+    """The angles opposite an edge sum to any number of degrees; each step of two is worth 25 of them."""
+    for left in (10.0, 35.0, 60.0, 89.0, 91.0, 120.0, 150.0):
+        for right in np.arange(2.0, 178.0, 4.0):
+            x, y = (1 / np.tan(np.radians(angle) / 2) for angle in (left, right))
+            V = np.array([[-1, 0, 0], [1, 0, 0], [0, x, 0], [0, -y, 0]])
+            mesh = built(V, [[0, 1, 2], [1, 0, 3]])
+            h = half_edge(mesh, 0, 1)
+            found = is_good_trade(mesh, h, int(mesh.twin[h]), gain, TRADES.trade)
+            assert naive.excess(V, [[0, 1, 2], [1, 0, 3]], 0, 1) == pytest.approx(
+                left + right - 180
+            )
+            assert found == (left + right - 180 > -TRADE * gain / 2), (left, right)
+
+
+@pytest.mark.parametrize("name", ["planar_delaunay", "genus_2", "icosphere"])
+@pytest.mark.parametrize("per_block", [20, 100_000])
+def test_trades_find_their_edges_and_end(name, per_block, monkeypatch):
+    """All edges that the twin wants are flipped or refused by a guard, and none flips for ever."""
+    V, F = zoo.upsampled(*zoo.ZOO[name].make(), n=1, noise=0.5, seed=1)
+    mesh = built(V, F, ordered=True)
+    blocks = blocks_of(mesh, per_block, monkeypatch)
+    counts = [flip_edges(mesh, blocks, TRADES, False)[FLIPPED] for _ in range(40)]
+    assert counts[0] > 10 and counts[-1] == 0
+    assert_valid(mesh)
+    assert shape_of(faces_of(mesh)) == shape_of(F)
+    W, G = mesh.X[:, :3], faces_of(mesh)
+    left = 0
+    for h, t in inner_pairs(mesh):
+        a, b = ends(mesh, h)
+        gain = valence_gain(mesh, h, t)
+        if gain != -1 and naive.excess(W, G, a, b) > -TRADE * gain / 2 + 1e-6:
+            c, d = (int(mesh.origin[g // 3 * 3 + (g + 2) % 3]) for g in (h, t))
+            left += 1
+            assert (
+                duplicates_edge(mesh, c, d)
+                or bends_quad(mesh, h, t, TRADES.normal_cosine)
+                or folds_neighbour(mesh, h, t)
+            )
+    assert left < 0.15 * len(G)  # the noise has turned faces over in the plane
 
 
 def test_vertices_of_three_edges_lose_none():
@@ -206,6 +253,23 @@ def test_normals_across_the_new_edge(degrees):
     mesh = built(V, [[0, 1, 2], [1, 0, 3]])
     h = half_edge(mesh, 0, 1)
     assert bends_quad(mesh, h, int(mesh.twin[h]), STRICT.normal_cosine) == (degrees > 45)
+
+
+@pytest.mark.parametrize("height", [0.5, 20.0])
+def test_a_flip_folds_no_face_beside_its_quad(height):
+    """The quad is a tent over its new edge; a wall stands at one side, steep or steeper than 150 degrees.
+
+    With the old faces the wall is not folded.
+    """
+    V = np.array([[-1, 0, 0], [1, 0, 0], [0, 1, 0.8], [0, -1, 0.8], [1.4, 1.4, -height]], float)
+    V[4, 2] = height
+    F = [[0, 1, 2], [1, 0, 3], [2, 1, 4]]
+    mesh = built(V, F)
+    h = half_edge(mesh, 0, 1)
+    new = [naive.normal(V, f) for f in naive.flip(F, 0, 1)]
+    wall, old = naive.normal(V, F[2]), naive.normal(V, F[0])
+    folds = any(naive.is_folded(wall, n) for n in new[1:]) and not naive.is_folded(wall, old)
+    assert folds == folds_neighbour(mesh, h, int(mesh.twin[h]))
 
 
 def test_sliver_check_is_an_option():

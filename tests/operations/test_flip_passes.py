@@ -25,6 +25,7 @@ from remeshvec.operations.flip import (
     duplicates_edge,
     flip_edges,
     flip_makes_sliver,
+    folds_neighbour,
 )
 from remeshvec.operations.outcomes import FLIPPED, N_FLIP_OUTCOMES
 
@@ -32,7 +33,9 @@ LIMITS = [
     FlipLimits(0.0, False, False),
     FlipLimits(np.cos(np.radians(60)), True, False),
     FlipLimits(np.cos(np.radians(20)), True, True),
+    FlipLimits(np.cos(np.radians(60)), True, False, np.tan(np.radians(25))),
 ]
+NAMES = ["loose", "default", "strict", "trades"]
 MESHES = ["torus", "planar_delaunay", "annulus", "genus_2", "icosphere", "thin_sheet", "sliver_fan"]
 
 
@@ -64,12 +67,11 @@ class Passes:
 
     def listed(self, find, *marks):
         candidates = make_candidates(3 * self.blocks.face)
-        ties = self.limits.delaunay_ties
-        find(False, self.mesh, self.blocks, ties, *marks, candidates)
+        find(False, self.mesh, self.blocks, self.limits, *marks, candidates)
         return candidates
 
     def all(self):
-        return self.listed(flip._find_flips)
+        return self.listed(flip._find_trades if self.limits.trade else flip._find_flips)
 
     def again(self):
         return self.listed(flip._find_again, self.touched)
@@ -95,6 +97,7 @@ class Passes:
         return not (
             duplicates_edge(mesh, c, d)
             or bends_quad(mesh, h, t, self.limits.normal_cosine)
+            or folds_neighbour(mesh, h, t)
             or (self.limits.sliver_check and flip_makes_sliver(mesh, h, t))
         )
 
@@ -108,7 +111,7 @@ class Passes:
 
 
 @pytest.mark.parametrize("per_block", [25, 10**6])
-@pytest.mark.parametrize("limits", LIMITS, ids=["loose", "default", "strict"])
+@pytest.mark.parametrize("limits", LIMITS, ids=NAMES)
 @pytest.mark.parametrize("name", MESHES)
 def test_no_flip_is_missed(name, limits, per_block, monkeypatch):
     """What a look at all edges would list and the guards allow is around a touched vertex."""
@@ -130,7 +133,7 @@ def test_no_flip_is_missed(name, limits, per_block, monkeypatch):
 
 
 @pytest.mark.parametrize("per_block", [25, 10**6])
-@pytest.mark.parametrize("limits", LIMITS, ids=["loose", "default", "strict"])
+@pytest.mark.parametrize("limits", LIMITS, ids=NAMES)
 @pytest.mark.parametrize("name", MESHES)
 def test_passes_end_where_nothing_is_left(name, limits, per_block, monkeypatch):
     mesh = rough(name, 1)

@@ -28,13 +28,15 @@ from remeshvec.operations.classify import classify_edges
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.flip import FlipLimits, flip_edges
+from remeshvec.operations.frames import FRAME_SIZE, measure_frames
+from remeshvec.operations.lloyd import Pace, run_lloyd_round, turn_velocities
 from remeshvec.operations.project import read_lengths
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.siblings import collapse_siblings
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
-from remeshvec.operations.unfold import undo_folds
-from remeshvec.operations.untangle import approach_vertices, untangle_vertices
+from remeshvec.operations.unfold import undo_folded_edges, undo_folds
+from remeshvec.operations.untangle import untangle_vertices
 
 MESHES = st.fixed_dictionaries(
     {
@@ -220,10 +222,21 @@ class Phases:
         arguments = (self.blocks, tree, o["project"], cosine(42), o["rounds"])
         self.run("untangle", lambda m, p: void(untangle_vertices(m, *arguments, p)))
 
-    def approach(self):
-        away = 0.05 * float(self.mesh.X[:, 3].min())
-        arguments = (self.blocks, self.reference.tree, self.o["project"], 1 / 3, away)
-        self.run("approach", lambda m, p: void(approach_vertices(m, *arguments, p)))
+    def even_out(self):
+        """Trades and Lloyd rounds, and what folds is taken back."""
+        limits = FlipLimits(cosine(self.o["flip_normal"]), True, self.o["sliver_check"], 0.4)
+        self.run("trade", lambda m, p: void(flip_edges(m, self.blocks, limits, p)))
+        before = self.mesh.X.copy()
+        self.run("lloyd", self.lloyd_rounds)
+        self.run("unfold edges", lambda m, p: void(undo_folded_edges(m, self.blocks, before, p)))
+
+    def lloyd_rounds(self, mesh, parallel):
+        frames, velocity = np.empty((len(mesh.X), FRAME_SIZE)), np.zeros((len(mesh.X), 3))
+        measure_frames(mesh, self.blocks, self.o["stiffness"], frames, parallel)
+        for varies in (False, True):
+            turn_velocities(mesh, self.blocks, frames, velocity, parallel)
+            pace = Pace(3.0, 0.85, 0.05)
+            run_lloyd_round(mesh, self.blocks, frames, velocity, pace, varies, parallel)
 
     def finish(self):
         self.run("compact", lambda m, p: compact(m, self.blocks, p))
@@ -270,7 +283,7 @@ def test_every_phase_keeps_curves_and_what_is_held(mesh, options, controls):
     run(mesh, options, controls)
 
 
-STEPS = st.lists(st.sampled_from([*SWEEP, "pack", "untangle", "approach"]), max_size=10)
+STEPS = st.lists(st.sampled_from([*SWEEP, "pack", "untangle", "even_out"]), max_size=10)
 
 
 @given(MESHES, OPTIONS, CONTROLS, STEPS)

@@ -7,7 +7,7 @@ from helpers.structure import assert_valid, blocks_of, built, copied, featured, 
 
 from remeshvec.core.vocabulary import CURVE, FIXED, HELD, INNER
 from remeshvec.operations.relax import relax_vertices
-from remeshvec.operations.unfold import undo_folds
+from remeshvec.operations.unfold import undo_folded_edges, undo_folds
 
 
 def turned(V, W, F, degrees=60.0):
@@ -149,3 +149,59 @@ def test_no_fold_beside_a_corner_of_a_curve(seed, side, slope):
     assert zoo.area(mesh.X[:, :3], F) == pytest.approx(64)
     assert np.array_equal(mesh.X[corner, :3], V[corner])
     assert np.linalg.norm(mesh.X[:, :3] - V, axis=1).max() > 0.1
+
+
+def folded_edges(X, F):
+    """Pairs of faces at edges that turn by more than 150 degrees."""
+    beside = {}
+    for k, f in enumerate(naive.tuples(F)):
+        for i in range(3):
+            beside.setdefault(frozenset((f[i], f[i - 1])), []).append(k)
+    normals = [naive.normal(X[:, :3], f) for f in naive.tuples(F)]
+    return {
+        tuple(pair)
+        for pair in beside.values()
+        if len(pair) == 2 and naive.is_folded(normals[pair[0]], normals[pair[1]])
+    }
+
+
+@pytest.mark.parametrize("amount", [0.3, 0.6])
+@pytest.mark.parametrize("per_block", [7, 100_000])
+@pytest.mark.parametrize("name", ["torus", "annulus", "cube", "genus_2"])
+def test_folded_edges_are_undone_as_by_the_twin(name, amount, per_block, monkeypatch):
+    """By rounds: of edges that are folded and were not, the inner vertices of both faces go back."""
+    mesh, before = shaken(name, amount, feature_angle=40.0)
+    start, F = mesh.X.copy(), mesh.origin.reshape(-1, 3)
+    old, X = folded_edges(before, F), mesh.X.copy()
+    assert folded_edges(X, F) - old
+    while True:
+        new = folded_edges(X, F) - old
+        back = {int(v) for pair in new for v in F[list(pair)].ravel() if mesh.kind[v] == INNER}
+        back = [v for v in back if not np.array_equal(X[v, :3], before[v, :3])]
+        if not back:
+            break
+        X[back, :3] = before[back, :3]
+    count = undo_folded_edges(mesh, blocks_of(mesh, per_block, monkeypatch), before, False)
+    assert np.array_equal(mesh.X, X)
+    assert count == (start[:, :3] != X[:, :3]).any(axis=1).sum() > 0
+    assert_valid(mesh)
+
+
+def test_old_folds_may_move():
+    """A fold of the input does not keep its vertices from moving."""
+    V, F = zoo.torus()
+    V[::7] += 0.8 * np.random.default_rng(0).normal(size=V[::7].shape)
+    mesh = built(V, F)
+    before = mesh.X.copy()
+    old = folded_edges(before, mesh.origin.reshape(-1, 3))
+    mesh.X[:, :3] *= 1.01
+    assert old and undo_folded_edges(mesh, one_block(mesh), before, False) == 0
+
+
+def test_faces_that_lose_their_area_go_back():
+    V, F = zoo.torus()
+    mesh = built(V, F)
+    before = mesh.X.copy()
+    mesh.X[F[0, 0], :3] = mesh.X[F[0, 1], :3]
+    assert undo_folded_edges(mesh, one_block(mesh), before, False) == 1
+    assert np.array_equal(mesh.X, before)

@@ -13,13 +13,12 @@ from helpers.structure import (
     copied,
     faces_of,
     one_block,
-    project,
     referenced,
 )
 
 from remeshvec.core.vocabulary import FIXED, INNER
 from remeshvec.operations.fit import fit_vertices
-from remeshvec.operations.untangle import approach_vertices, untangle_vertices
+from remeshvec.operations.untangle import untangle_vertices
 
 MESHES = ["icosphere", "torus", "planar_delaunay", "annulus", "genus_2"]
 
@@ -147,87 +146,6 @@ def test_curves_stay_and_patches_are_kept(name):
     assert (mesh.kind[moved] == INNER).all()
     assert_on_reference(mesh, reference)
     assert_valid(mesh)
-
-
-# --- by distance -----------------------------------------------------------------------------
-
-
-def bent():
-    """Coarse torus on a fine one: its faces are off by up to 0.02, its vertices lie on it."""
-    fine = built(*zoo.torus(96, 48), ordered=True)
-    reference = referenced(fine, 0.3)
-    V, F = zoo.torus(24, 12)
-    mesh = built(V, F, ordered=True, length=0.25)
-    project(mesh, reference)
-    return mesh, reference
-
-
-def distances(mesh, reference):
-    """Of the centroids of all faces, squared."""
-    F = faces_of(mesh)
-    R = reference.origin.reshape(-1, 3).astype(np.int64)
-    P = mesh.X[F, :3].mean(axis=1)
-    return igl.point_mesh_squared_distance(P, reference.X[:, :3].copy(), R)[0]
-
-
-THIRD = 1 / 3  # squared circumradius of an equilateral triangle, in squared edges
-
-
-def by_distance(mesh, reference, distance):
-    blocks = one_block(mesh)
-    return approach_vertices(mesh, blocks, reference.tree, True, THIRD, distance, False)
-
-
-def costs(mesh, reference, distance):
-    """Of every face: its squared distance, or its squared circumradius, against their limits."""
-    V, F = mesh.X[:, :3], faces_of(mesh)
-    sides = np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2)
-    double = np.array([np.linalg.norm(naive.normal(V, f)) for f in F.tolist()])
-    radius = sides.prod(axis=1) / (2 * double)
-    lengths = mesh.X[F, 3].mean(axis=1)
-    return np.maximum(THIRD * distances(mesh, reference) / distance**2, (radius / lengths) ** 2)
-
-
-def test_each_move_brings_its_ring_closer():
-    """One vertex at a time; the largest cost around it falls, and it stays on the surface."""
-    mesh, reference = bent()
-    distance = np.quantile(np.sqrt(distances(mesh, reference)), 0.6)
-    F = faces_of(mesh)
-    bad = np.unique(F[np.sqrt(distances(mesh, reference)) > distance])[:40]
-    count = 0
-    for v in bad:
-        alone, _ = bent()
-        alone.kind[np.arange(len(alone.X)) != v] = FIXED
-        before = costs(alone, reference, distance)[(v == F).any(axis=1)].max()
-        moved = by_distance(alone, reference, distance)
-        after = costs(alone, reference, distance)[(v == F).any(axis=1)].max()
-        count += moved
-        assert after < before if moved else after == before
-        assert (
-            naive.distance_to_mesh(alone.X[v, :3], reference.X[:, :3], near(reference, alone.X[v]))
-            < 1e-12
-        )
-    assert count > 5
-
-
-def near(reference, p):
-    """Faces of the reference around a point."""
-    F = reference.origin.reshape(-1, 3)
-    away = np.linalg.norm(reference.X[F, :3].mean(axis=1) - p[:3], axis=1)
-    return F[np.argsort(away)[:30]]
-
-
-def test_only_rings_that_lie_too_far_away_move():
-    """Whatever their angles and circles are."""
-    mesh, reference = bent()
-    before = mesh.X.copy()
-    assert by_distance(mesh, reference, 1.01 * np.sqrt(distances(mesh, reference).max())) == 0
-    assert np.array_equal(mesh.X, before)
-    limit = np.quantile(np.sqrt(distances(mesh, reference)), 0.9)
-    far = faces_of(mesh)[np.sqrt(distances(mesh, reference)) > limit]
-    assert by_distance(mesh, reference, limit) > 0
-    moved = np.flatnonzero((before != mesh.X).any(axis=1))
-    assert np.isin(moved, far).all()
 
 
 # --- fit -----------------------------------------------------------------------------------------

@@ -76,7 +76,7 @@ def test_splits_that_would_leave_no_numbers_are_refused(monkeypatch):
 def measured(monkeypatch, to_input, from_input):
     found = {"to_input": to_input, "from_input": from_input}
     job = sys.modules["remeshvec.pipeline.job"]
-    monkeypatch.setattr(job, "measure_deviation", lambda *_: found)
+    monkeypatch.setattr(job, "deviation_of", lambda *_: found)
 
 
 def test_a_deviation_that_is_not_met_is_a_warning(monkeypatch):

@@ -32,12 +32,14 @@ from remeshvec.operations.classify import classify_edges
 from remeshvec.operations.collapse import CollapseLimits, collapse_short_edges
 from remeshvec.operations.fit import fit_vertices
 from remeshvec.operations.flip import FlipLimits, flip_edges
+from remeshvec.operations.frames import FRAME_SIZE, measure_frames
+from remeshvec.operations.lloyd import Pace, run_lloyd_round, turn_velocities
 from remeshvec.operations.project import project_curves, read_lengths
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
-from remeshvec.operations.unfold import undo_folds
-from remeshvec.operations.untangle import approach_vertices, untangle_vertices
+from remeshvec.operations.unfold import undo_folded_edges, undo_folds
+from remeshvec.operations.untangle import untangle_vertices
 from remeshvec.output import extract
 from remeshvec.reference.bvh import Surface, closest_faces
 from remeshvec.reference.crossings import crossing_faces
@@ -68,16 +70,20 @@ def phases():
     flips = FlipLimits(0.7, True, False)
     yield "measure", lambda m, b, r, p: tuple(classify_edges(m, b, 1.0, 0.8, p))
     yield "flip", lambda m, b, r, p: flip_edges(m, b, flips, p, passes=3)
+    trades = FlipLimits(0.7, True, False, 0.4)
+    yield "trade", lambda m, b, r, p: flip_edges(m, b, trades, p)
     yield "collapse", lambda m, b, r, p: collapse_short_edges(m, b, collapses, p)
     yield "bisect", lambda m, b, r, p: bisect_edges(m, b, classify_edges(m, b, 1.3, 0.8, p), p)
     yield "slide", lambda m, b, r, p: slide_vertices(m, b, r, p)
     for stiffness in (20.0, 0.0):
         yield "relax", lambda m, b, r, p, s=stiffness: relax_vertices(m, b, s, p)
+    for varies in (False, True):
+        yield "lloyd", lambda m, b, r, p, v=varies: lloyd_rounds(m, b, v, p)
     yield "unfold", lambda m, b, r, p: unfold(m, b, p)
+    yield "unfold edges", lambda m, b, r, p: unfold(m, b, p, undo_folded_edges)
     yield "project", lambda m, b, r, p: project(shifted(m), r, b, p)
     yield "project curves", lambda m, b, r, p: project_curves(shifted(m), b, r, p)
     yield "untangle", lambda m, b, r, p: untangle_vertices(m, b, r.tree, True, 0.8, 2, p)
-    yield "approach", lambda m, b, r, p: approach_vertices(m, b, r.tree, True, 0.33, 1e-4, p)
     yield "fit", lambda m, b, r, p: fit_vertices(m, b, r.tree, 0.1, p)
     yield "locate", lambda m, b, r, p: locate(m, r, b, p)
     yield "lengths", lambda m, b, r, p: read_lengths(stretched(m), b, r, p)
@@ -113,9 +119,18 @@ def shifted(mesh):
     return mesh
 
 
-def unfold(mesh, blocks, parallel):
+def unfold(mesh, blocks, parallel, undo=undo_folds):
     before = mesh.X.copy()
-    return undo_folds(shifted(mesh), blocks, before, parallel)
+    return undo(shifted(mesh), blocks, before, parallel)
+
+
+def lloyd_rounds(mesh, blocks, varies, parallel):
+    frames, velocity = np.empty((len(mesh.X), FRAME_SIZE)), np.zeros((len(mesh.X), 3))
+    for _ in range(3):
+        measure_frames(mesh, blocks, 400.0, frames, parallel)
+        turn_velocities(mesh, blocks, frames, velocity, parallel)
+        run_lloyd_round(mesh, blocks, frames, velocity, Pace(3.0, 0.85, 0.05), varies, parallel)
+    return frames, velocity
 
 
 def stretched(mesh):
@@ -275,7 +290,7 @@ def assert_identical(seen):
     assert [seen[case][1] for case in seen if case.startswith(("2", "4"))][:2] == [2, 4]
 
 
-@pytest.mark.parametrize("preset", ["fast", "default", "fine"])
+@pytest.mark.parametrize("preset", ["fast", "default", "even", "fine"])
 def test_threads_give_the_same_bits(tmp_path, preset):
     V, F = mesh()
     assert_identical(digests(tmp_path, V, F, 0.8 * zoo.mean_edge(V, F), preset=preset))

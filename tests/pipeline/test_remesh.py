@@ -11,7 +11,7 @@ from helpers.structure import shape_of
 
 from remeshvec import remesh
 
-PRESETS = ["fast", "default", "fine"]
+PRESETS = ["fast", "default", "even", "fine"]
 
 
 def distance(P, V, F):
@@ -259,7 +259,7 @@ def test_callback_sees_every_phase_and_may_stop():
     seen = []
     result = remesh(V, F, 0.3, iterations=4, callback=lambda *args: seen.append(args))
     assert [sweep for sweep, phase, _ in seen if phase == "split"] == [0, 1, 2, 3]
-    assert {phase for _, phase, _ in seen} == {"split", "collapse", "flip", "relax"}
+    assert {phase for _, phase, _ in seen} == {"split", "collapse", "flip", "relax", "even out"}
     assert [count for _, phase, count in seen if phase == "flip"] == [
         sweep["flip"] for sweep in result.report.sweeps
     ]
@@ -274,6 +274,20 @@ def test_cancelled_calls_return_a_mesh(phase):
     assert len(result.report.sweeps) == 2
     assert_manifold(result.F, like=F)
     assert assert_births(result, V, F).all()
+
+
+def test_rounds_may_be_cancelled():
+    V, F = zoo.torus()
+    seen = []
+
+    def stop(_, phase, __):
+        seen.append(phase)
+        return seen.count("even out") < 2
+
+    result = remesh(V, F, 0.3, preset="even", callback=stop)
+    assert result.report.stop == "cancelled"
+    assert seen.count("even out") == 2
+    assert_manifold(result.F, like=F)
 
 
 @pytest.mark.parametrize("answer", [False, np.False_, True, np.True_, None, 0, 0.0, "", []])

@@ -76,7 +76,7 @@ def test_collapses_are_told_the_truth(name, sizes, per_block, monkeypatch):
 
     spy = Spy(monkeypatch, sweeps, "collapse_short_edges", look)
     called(name, varies=sizes == "varies", adaptive=sizes == "adaptive")
-    assert len(spy.calls) >= CASES[name][2].get("iterations", 12)
+    assert len(spy.calls) >= CASES[name][2].get("iterations", 8)
 
 
 def test_where_rounds_run_out_edges_are_measured_again(monkeypatch):

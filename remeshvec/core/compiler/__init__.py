@@ -2,10 +2,11 @@
 
 from .decorators import inlined, kernel, shared, threaded
 from .notice import compile_notice
-from .vector_sums import add_four, add_row
+from .vector_sums import add_four, add_moment, add_row
 
 __all__ = [
     "add_four",
+    "add_moment",
     "add_row",
     "compile_notice",
     "inlined",
