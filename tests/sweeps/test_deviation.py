@@ -6,9 +6,12 @@ from helpers import zoo
 from helpers.complexes import shape
 from helpers.invariants import assert_clean
 from helpers.measures import diagonal
+from helpers.structure import built, featured
 
 from data.shapes.solids import plate, uv_sphere
 from remeshvec import remesh, surface_distance
+from remeshvec.sweeps.deviation import DeviationCheck, measure_deviation
+from remeshvec.sweeps.guard import tree_of
 
 # Shape, and two deviations as shares of the diagonal.  Real meshes have details finer than 0.005.
 SHAPES = {
@@ -96,3 +99,18 @@ def test_where_it_is_short_is_where_it_curves():
     flat = (result.V[:, 0] < -0.7) & (result.V[:, 2] < 1e-9)
     curved = result.V[:, 2] > 0.05
     assert np.median(result.lengths[flat]) > 1.5 * np.median(result.lengths[curved])
+
+
+@pytest.mark.parametrize("amount", [0.0, 0.05])
+def test_the_largest_deviation_is_that_of_all_samples(amount):
+    """Found without a search for most of them."""
+    V, F = zoo.torus(48, 20)
+    other = featured(built(V, F, ordered=True), 0.3)
+    coarse = built(*zoo.perturb(*zoo.torus(20, 10), amount), ordered=True, length=0.6)
+    coarse.birth[:] = coarse.source[:] = 0  # a face of the reference to start at
+    _, to_input, from_input = DeviationCheck(other, 0.1, False).distances(
+        coarse, tree_of(coarse, False), 0.0
+    )
+    found = measure_deviation(coarse, other, False)
+    assert found["to_input"] == pytest.approx(to_input.max(), rel=1e-12)
+    assert found["from_input"] == pytest.approx(from_input.max(), rel=1e-12)
