@@ -16,6 +16,7 @@ __all__ = [
     "BORDER",
     "CLEAN",
     "CROWDED",
+    "CURVED",
     "ECHO",
     "HARD",
     "NOISE",
@@ -42,7 +43,8 @@ BORDER = 6  # on the boundary: kept, but does not keep its chain
 
 # Instead of a class, why an edge is no crease.
 NOISE = 0  # it does not stand out of the noise around it
-ECHO = -1  # its turn repeats beside it
+ECHO = -1  # its turn comes twice
+CURVED = -5  # its turn comes again and again
 TERRACE = -2  # it is the edge of a step of a terraced surface
 SHORT = -3  # its chain is too short or unsure
 CROWDED = -4  # a surer crease runs along it, or meets it at an acute angle

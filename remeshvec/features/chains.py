@@ -209,7 +209,7 @@ def _component_stays(groups, g):
     return (
         sums[g, 0] >= COMPONENT_LENGTH * SLACK
         or (is_sure and is_long and traits[g] & _AN_ANCHOR != 0)
-        or (is_sure and counts[g, 0] >= CLOSED_EDGES and traits[g] & _A_LOOSE_END == 0)
-        or (counts[g, 1] >= CLEAN_EDGES and sums[g, 3] >= half)
+        or (is_sure and is_long and counts[g, 0] >= CLOSED_EDGES and traits[g] & _A_LOOSE_END == 0)
+        or (is_long and counts[g, 1] >= CLEAN_EDGES and sums[g, 3] >= half)
         or traits[g] & _A_HARD != 0
     )

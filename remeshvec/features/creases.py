@@ -13,6 +13,8 @@ import numpy as np
 from ..core.vocabulary import NONE, BoolArray, FloatArray, IndexArray, IntArray
 from .candidates import (
     BORDER,
+    CROWDED,
+    CURVED,
     ECHO,
     HARD,
     NOISE,
@@ -22,9 +24,10 @@ from .candidates import (
     measure_candidates,
 )
 from .chains import count_chains, keep_chains
-from .designed import promote
+from .crowds import drop_acute
+from .designed import find_designed, is_part, promote
 from .dihedral import ANGLE_TOLERANCE, DihedralAngles, find_dihedral_angles, least_cosine
-from .echo import drop_echoes
+from .echo import drop_echoes, restore_facets
 from .links import measure_segments
 from .noise import noise_at_vertices
 from .terraces import drop_terraces
@@ -133,15 +136,27 @@ def _creases(
     segments = measure_segments(X, origin, found, mean_edge)
     drop_terraces(ground, candidates, segments, mean_edge, parallel)
     drop_echoes(ground, candidates, parallel)
-    promote(candidates, segments)
+    designed = find_designed(candidates, segments)
+    on_part = is_part(candidates, segments, designed)
+    if on_part:
+        restore_facets(ground, candidates, parallel)
+    promote(candidates, segments, designed, on_part)
     counts["dropped_noise"] = int(np.count_nonzero(rank == NOISE))
-    counts["dropped_echo"] = int(np.count_nonzero(rank == ECHO))
+    counts["dropped_echo"] = int(np.count_nonzero((rank == ECHO) | (rank == CURVED)))
     counts["dropped_terrace"] = int(np.count_nonzero(rank == TERRACE))
     fixed = _one_of_each(is_hard, twin)
     edges = np.concatenate([fixed, found])
     hard = np.where(twin[fixed] == NONE, BORDER, HARD).astype(np.int8)
     ranks = np.concatenate([hard, rank])
     segments = measure_segments(X, origin, edges, mean_edge)
-    keep = keep_chains(segments, ranks)[len(fixed) :]
+    strength = np.concatenate([np.full(len(fixed), np.inf), candidates.ratio * candidates.turn])
+    is_safe = (ranks >= HARD) | (np.concatenate([np.full(len(fixed), np.inf), candidates.ratio]) >= 100)
+    keep = keep_chains(segments, ranks)
+    for _ in range(2):
+        if not drop_acute(segments, ranks, strength, is_safe, keep):
+            break
+        keep = keep_chains(segments, ranks)
+    counts["dropped_crowded"] = int(np.count_nonzero(ranks == CROWDED))
+    keep = keep[len(fixed):]
     counts["dropped_short"] = int((~keep & (rank > 0)).sum())
     return found[keep]

@@ -9,7 +9,7 @@ import numpy as np
 from ..core.compiler import inlined, threaded
 from ..core.vocabulary import NONE
 from ..mesh.walk import next_halfedge
-from .candidates import CLEAN, ECHO, PIECE, STEEP_TURN, Candidates, Ground, per_piece
+from .candidates import CLEAN, CLEAN_RATIO, CURVED, ECHO, PIECE, STEEP_TURN, Candidates, Ground, per_piece
 from .dihedral import face_cosine
 from .walks import PARALLEL, across, cross_face, edge_vector, is_convex
 
@@ -33,7 +33,8 @@ MAX_STEPS = 24
 # In target lengths: facets narrower than the first are curvature at the scale of the new mesh;
 # beside a clean edge the second.
 ECHO_REACH = 1.5
-CLEAN_REACH = 0.75
+CLEAN_REACH = 1.25
+FACET_REACH = 0.75
 
 # A clean edge that turns by more degrees than this is drawn, not tessellated, whatever is beside it.
 DRAWN_TURN = 40.0
@@ -42,25 +43,43 @@ DRAWN_TURN = 40.0
 def drop_echoes(ground: Ground, candidates: Candidates, parallel: bool) -> None:
     """Take the class from edges whose turn repeats beside them.
 
+    In noise one echo is enough. A clean turn that comes twice makes a chamfer or a land; if it comes
+    three times it is curvature.
+
     All are judged by what the surface is, so the order does not matter.
     """
     _drop(parallel, candidates.edges, ground, candidates.turn, candidates.rank)
 
 
+def restore_facets(ground: Ground, candidates: Candidates, parallel: bool) -> None:
+    """Give the edges of wide facets their class back: on a part they are those of a prism."""
+    curved = np.flatnonzero(candidates.rank == CURVED)
+    is_facet = np.empty(len(curved), np.bool_)
+    _mark_facets(parallel, candidates.edges[curved], ground, candidates.turn[curved], is_facet)
+    facets = curved[is_facet]
+    candidates.rank[facets] = np.where(candidates.ratio[facets] >= CLEAN_RATIO, CLEAN, ECHO)
+
+
 @threaded(per_piece)
 def _drop(span, edges, ground, turn, rank):
     for k in range(PIECE * span[0], min(PIECE * span[1], len(edges))):
-        if rank[k] <= 0:
+        if rank[k] <= 0 or turn[k] >= STEEP_TURN:
             continue
-        h = edges[k]
-        if rank[k] != CLEAN:
-            is_echo = turn[k] < STEEP_TURN and _repeats(ground, h, turn[k], ECHO_REACH, 1)
-        elif turn[k] < DRAWN_TURN:
-            is_echo = _repeats(ground, h, turn[k], CLEAN_REACH, 2)
-        else:
-            is_echo = turn[k] < STEEP_TURN and _is_inside_fillet(ground, h, turn[k])
-        if is_echo:
+        is_clean = rank[k] == CLEAN
+        echoes = _echoes(ground, edges[k], turn[k], CLEAN_REACH if is_clean else ECHO_REACH)
+        if echoes == 2:
+            rank[k] = CURVED
+        elif echoes == 1 and not is_clean:
             rank[k] = ECHO
+
+
+@threaded(per_piece)
+def _mark_facets(span, edges, ground, turn, is_facet):
+    for k in range(PIECE * span[0], min(PIECE * span[1], len(edges))):
+        if turn[k] >= DRAWN_TURN:
+            is_facet[k] = not _is_inside_fillet(ground, edges[k], turn[k])
+        else:
+            is_facet[k] = _echoes(ground, edges[k], turn[k], FACET_REACH) < 2
 
 
 @inlined
@@ -71,22 +90,21 @@ def _target(ground, h):
 
 
 @inlined
-def _repeats(ground, h, turn, reach, enough):
-    """Tell whether a turn comes again often enough.
+def _echoes(ground, h, turn, reach):
+    """Count how often a turn comes again, up to 2, on both sides together.
 
-    In noise one echo is enough. A clean turn that comes twice makes a chamfer or a land; if it comes
-    three times it is curvature.
+    Once is enough where the walk ends at the border on the other side: there might be more of them.
     """
     quiet, loud = echo_cosines(radians(turn))
     reach = reach * _target(ground, h)
     total = 0
     open_sides = 0
     for g in (h, np.int64(ground.twin[h])):
-        if total < enough:
-            echoes, is_cut_short = echoes_beside(ground, g, reach, quiet, loud, enough)
+        if total < 2:
+            echoes, is_cut_short = echoes_beside(ground, g, reach, quiet, loud, 2)
             total += echoes
             open_sides += echoes == 0 and not is_cut_short
-    return total >= enough or (total == 1 and open_sides == 0)
+    return 2 if total == 1 and open_sides == 0 else min(total, 2)
 
 
 @inlined

@@ -10,6 +10,7 @@ from helpers.structure import built, mean_edge_of, next_of
 from data.shapes import cad_parts
 from remeshvec.core.compiler import kernel
 from remeshvec.core.vocabulary import NONE
+from remeshvec.features.candidates import Ground
 from remeshvec.features.creases import find_creases
 from remeshvec.features.echo import echo_cosines, echoes_beside
 
@@ -187,10 +188,9 @@ def test_steps_and_ends_of_faces_are_no_echo(noise):
 @kernel
 def listen(X, origin, twin, normals, is_hard, edges, reach, turn, echoes):
     quiet, loud = echo_cosines(turn)
+    ground = Ground(X, origin, twin, normals, is_hard)
     for k in range(len(edges)):
-        echoes[k] = echoes_beside(
-            X, origin, twin, normals, is_hard, edges[k], reach, quiet, loud, 2
-        )[0]
+        echoes[k] = echoes_beside(ground, edges[k], reach, quiet, loud, 2)[0]
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -1,0 +1,81 @@
+"""Creases too close to each other: where two meet at an acute angle, the less sure one gives way."""
+
+from __future__ import annotations
+
+from math import cos, radians, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.compiler import inlined, kernel
+from ..core.vocabulary import NONE, BoolArray, FloatArray
+from .candidates import CROWDED
+from .links import MAX_ENDS, Ends, Segments, bend_cosine, list_ends
+
+__all__ = ["drop_acute"]
+
+# Two edges at a vertex are a pair if the angle between them is below so many degrees...
+ACUTE = cos(radians(35.0))
+
+# ... and the end of the one is less than so many target lengths from the line of the other.
+CLEARANCE = 0.6
+
+
+def drop_acute(
+    segments: Segments, rank: NDArray[np.int8], strength: FloatArray, is_safe: BoolArray, kept: BoolArray
+) -> bool:
+    """Take the class from kept edges that meet a surer one at an acute angle, on scans mostly flaws.
+
+    Parameters
+    ----------
+    segments : Segments
+    rank : (k,) int8
+        Of two clean edges both stay; ``CROWDED`` is written.
+    strength : (k,) float64
+        Of the other pairs the edge with less strength goes.
+    kept : (k,) bool
+
+    Returns
+    -------
+    bool
+        Whether any was found.
+    """
+    return bool(_drop_acute(segments, np.flatnonzero(kept), rank, strength, is_safe))
+
+
+@kernel
+def _drop_acute(segments, kept, rank, strength, is_safe):
+    k, n = rank.size, segments.n
+    lists, links = np.empty((2, n), np.int32), np.empty((2, 2 * k), np.int32)
+    ends = Ends(lists[0], lists[1], links[0], links[1])
+    list_ends(segments.end, kept, kept.size, ends)
+    weaker = np.zeros(k, np.bool_)
+    for v in range(n):
+        if not 1 < ends.size[v] <= MAX_ENDS:
+            continue
+        i = ends.head[v]
+        while i != NONE:
+            j = ends.after[i]
+            while j != NONE:
+                p, q = i // 2, j // 2
+                cosine = -bend_cosine(segments.unit, i, j)
+                if cosine > ACUTE and not (is_safe[p] and is_safe[q]):
+                    lesser = p if _is_weaker(is_safe, strength, p, q) else q
+                    height = segments.length[lesser, 1] * sqrt(max(0.0, 1.0 - cosine * cosine))
+                    weaker[lesser] |= height < CLEARANCE
+                j = ends.after[j]
+            i = ends.after[i]
+    found = False
+    for e in range(k):
+        if weaker[e]:
+            rank[e] = CROWDED
+            found = True
+    return found
+
+
+@inlined
+def _is_weaker(is_safe, strength, p, q):
+    """Compare two edges; of equal ones the later is the weaker."""
+    if is_safe[p] != is_safe[q]:
+        return is_safe[q]
+    return strength[p] < strength[q]
