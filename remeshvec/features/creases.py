@@ -137,7 +137,7 @@ def _creases(
     drop_terraces(ground, candidates, segments, mean_edge, parallel)
     drop_echoes(ground, candidates, parallel)
     designed = find_designed(candidates, segments)
-    on_part = is_part(candidates, segments, designed)
+    on_part = is_part(candidates, segments)
     if on_part:
         restore_facets(ground, candidates, parallel)
     promote(candidates, segments, designed, on_part)

@@ -22,7 +22,7 @@ ECHO_SHARE = 0.4
 MULTIPLE = 1.7
 
 # Edges at the ends of a fillet turn by less than this share of one inside.
-FILLET_SHARE = 0.8
+FILLET_SHARE = 0.65
 
 # A walk that turned by more than about 70 degrees in space is no longer beside its edge.
 AWAY = 0.3
