@@ -159,4 +159,4 @@ def _creases(
     counts["dropped_crowded"] = int(np.count_nonzero(ranks == CROWDED))
     keep = keep[len(fixed):]
     counts["dropped_short"] = int((~keep & (rank > 0)).sum())
-    return found[keep]
+    return candidates.edges[keep]

@@ -58,7 +58,7 @@ def drop_terraces(
     parallel : bool
     """
     is_clean = candidates.rank == CLEAN
-    is_asked = is_clean & (candidates.turn < TERRACE_TURN) & (segments.length[:, 1] <= EDGE)
+    is_asked = is_clean & (candidates.turn < TERRACE_TURN)
     asked = np.flatnonzero(is_asked)
     if not len(asked):
         return
@@ -66,7 +66,8 @@ def drop_terraces(
     edges, turn = candidates.edges[asked], candidates.turn[asked]
     _walk_down(parallel, edges, ground, turn, mean_edge, is_step, back)
     length = segments.length[asked, 0]
-    if (length * is_step).sum() < MASK_SHARE * segments.length[is_clean, 0].sum():
+    is_short = segments.length[asked, 1] <= EDGE
+    if (length * (is_step & is_short)).sum() < MASK_SHARE * segments.length[is_clean, 0].sum():
         return
     is_step |= back <= MASK_GAP
     root = np.empty(segments.n, np.int32)
