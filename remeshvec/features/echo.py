@@ -9,7 +9,17 @@ import numpy as np
 from ..core.compiler import inlined, threaded
 from ..core.vocabulary import NONE
 from ..mesh.walk import next_halfedge
-from .candidates import CLEAN, CLEAN_RATIO, CURVED, ECHO, PIECE, STEEP_TURN, Candidates, Ground, per_piece
+from .candidates import (
+    CLEAN,
+    CLEAN_RATIO,
+    CURVED,
+    ECHO,
+    PIECE,
+    STEEP_TURN,
+    Candidates,
+    Ground,
+    per_piece,
+)
 from .dihedral import face_cosine
 from .walks import PARALLEL, across, cross_face, edge_vector, is_convex
 

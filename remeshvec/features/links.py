@@ -20,6 +20,7 @@ __all__ = [
     "link_chains",
     "list_ends",
     "measure_segments",
+    "networks",
 ]
 
 # A chain bends by at most 45 degrees at a vertex.
@@ -36,6 +37,10 @@ class Segments(NamedTuple):
     unit: FloatArray  # (k, 3) direction
     length: FloatArray  # (k, 2) in the units of X, and in target lengths
     n: int  # number of different ends
+
+    def after(self, k: int) -> Segments:
+        """Return the segments after the first ``k``."""
+        return Segments(self.end[k:], self.unit[k:], self.length[k:], self.n)
 
 
 class Ends(NamedTuple):
@@ -66,6 +71,18 @@ def measure_segments(
     segments = Segments(np.empty((k, 2), np.int32), np.empty((k, 3)), np.empty((k, 2)), 0)
     n = _measure(X, origin, edges, mean_edge, np.full(len(X), NONE, np.int32), segments)
     return segments._replace(n=int(n))
+
+
+def networks(segments: Segments, chosen: IntArray) -> IndexArray:
+    """Return for some of the segments the smallest end of the connected network to which each belongs."""
+    root = np.empty(segments.n, np.int32)
+    _connect_all(segments.end, chosen, root)
+    return root[segments.end[chosen, 0]]
+
+
+@kernel
+def _connect_all(end, chosen, root):
+    connect(end, chosen, chosen.size, root)
 
 
 @kernel

@@ -11,12 +11,12 @@ from math import radians
 
 import numpy as np
 
-from ..core.compiler import inlined, kernel, threaded
+from ..core.compiler import inlined, threaded
 from ..core.vocabulary import NONE
 from .candidates import CLEAN, PIECE, TERRACE, Candidates, Ground, per_piece
 from .dihedral import face_cosine
 from .echo import echo_cosines
-from .links import Segments, connect
+from .links import Segments, networks
 from .walks import PARALLEL, cross_face, edge_vector, is_convex
 
 __all__ = ["drop_terraces"]
@@ -70,22 +70,15 @@ def drop_terraces(
     if (length * (is_step & is_short)).sum() < MASK_SHARE * segments.length[is_clean, 0].sum():
         return
     is_step |= back <= MASK_GAP
-    root = np.empty(segments.n, np.int32)
-    _connect(segments.end, asked, root)
-    part = root[segments.end[asked, 0]]
-    of_steps = np.bincount(part, length * is_step, segments.n)
-    total = np.bincount(part, length, segments.n)
-    candidates.rank[asked[of_steps[part] >= SHARE * total[part]]] = TERRACE
-
-
-@kernel
-def _connect(end, asked, root):
-    connect(end, asked, asked.size, root)
+    network = networks(segments, asked)
+    of_steps = np.bincount(network, length * is_step)[network]
+    total = np.bincount(network, length)[network]
+    candidates.rank[asked[of_steps >= SHARE * total]] = TERRACE
 
 
 @threaded(per_piece)
 def _walk_down(span, edges, ground, turn, mean_edge, is_step, back):
-    """Walk from both sides of edges: are they steps, and how near does the surface bend back?"""
+    """Walk away from both sides of edges; note which are steps, and how near the surface bends back."""
     X = ground.X
     for k in range(PIECE * span[0], min(PIECE * span[1], len(edges))):
         h = edges[k]
@@ -100,6 +93,7 @@ def _walk_down(span, edges, ground, turn, mean_edge, is_step, back):
 
 @inlined
 def _is_step(back, again, gap):
+    """Tell whether the same turn comes again, with one to the other side close to either."""
     return again < np.inf and min(back, again - back) <= gap
 
 
