@@ -94,6 +94,7 @@ REMESH = {
     "fit": NOT_FLAGS,
     "avoid_intersections": NOT_FLAGS,
     "feature_angle": [True, "1", "x", NAN, INF, -1.0, 181.0, [30.0], {}],
+    "corner_angle": [*NOT_POSITIVE, 181.0],
     "feature_edges": [
         "1", [0.5], [[0, 99]], [[0, -1]], [[0, 0.5]], [[0, 1, 2]], [[0], [1, 2]], [[0, 8]],
     ],

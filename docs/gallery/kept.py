@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from benchmarks.panels import FloatArray, IntArray, Panel, Picture, borders, by_amount, by_label
-from data.shapes.drawn import flag, notched_sheet
+from data.shapes.drawn import flag, notched_sheet, tiles
 from remeshvec import remesh
 
 from .scene import BRACKET, CREATURE, SHEET, mesh, panel, side_by_side
@@ -21,6 +21,18 @@ def feature_angle() -> Picture:
         for angle in ("auto", None)
     ]
     return side_by_side(panels, BRACKET)
+
+
+def corner_angle() -> Picture:
+    """Corners of a hexagon, which turn by 60 degrees, and of a square, 90."""
+    V, F, labels = tiles()
+    panels = []
+    for angle in (None, 75.0, 180.0):
+        result = remesh(V, F, 0.14, face_labels=labels, corner_angle=angle)
+        colours = by_label(result.face_labels)
+        caption = f"corner_angle={angle}"
+        panels.append(panel(caption, result, colours, dots=result.corners))
+    return side_by_side(panels, SHEET, 3)
 
 
 def feature_edges() -> Picture:
@@ -156,6 +168,6 @@ def shortest_path(V: FloatArray, F: IntArray, start: int, end: int) -> IntArray:
 
 
 PICTURES = (
-    feature_angle, feature_edges, fixed_vertices, fixed_faces, face_labels, preserve, selection, boundary,
-    return_result,
+    feature_angle, corner_angle, feature_edges, fixed_vertices, fixed_faces, face_labels, preserve,
+    selection, boundary, return_result,
 )  # fmt: skip

@@ -34,6 +34,7 @@ class Constraints:
     """What must stay, in terms of the input's vertices and faces."""
 
     feature_angle: float | str | None  # "auto", degrees, or None
+    corner_angle: float | None  # degrees, or None
     boundary: str
     feature_edges: NDArray[np.int64]  # (k, 2)
     fixed_vertices: NDArray[np.int64]  # (k,)
@@ -179,6 +180,7 @@ def make_constraints(n: int, F: NDArray[np.int64], options: RemeshOptions) -> Co
     fixed, unselected = _kept_faces(options, len(F))
     return Constraints(
         _feature_angle(options.feature_angle),
+        _corner_angle(options.corner_angle),
         choice(options.boundary, "boundary", get_args(Boundary)),
         _feature_edges(options.feature_edges, n, F),
         _fixed_vertices(options.fixed_vertices, n),
@@ -266,6 +268,14 @@ def _feature_angle(value: Any) -> float | str | None:
         raise OptionError(
             f'feature_angle must be "auto", None or degrees between 0 and 180; got {value!r}'
         ) from None
+
+
+def _corner_angle(value: Any) -> float | None:
+    return (
+        None
+        if value is None
+        else number(value, "corner_angle", above=0.0, high=180.0, unit="degrees")
+    )
 
 
 def _feature_edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -204,7 +204,11 @@ class Job:
             self.recipe.max_deviation,
         )
         mean_edge = self.size.mean_edge
-        return build_reference(mesh, source, angle, marks, mean_edge, self.parallel), length
+        corner_angle = constraints.corner_angle
+        featured = build_reference(
+            mesh, source, angle, marks, mean_edge, self.parallel, corner_angle
+        )
+        return featured, length
 
 
 def _most_faces(allowed: int) -> int:
