@@ -34,7 +34,7 @@ SHORT_SHARE = 0.125
 # voxel: over L / 2 each of their steps is a corner. Teeth as wide as 3/4 L do not vanish. On 100 meshes
 # without labels the share is at most 0.22, but 0.5 on two with ragged borders.
 ZIGZAG_SHARE = 0.4
-ZIGZAG_CORNERS = 6
+ZIGZAG_CORNERS = 3
 
 # Turns are rounded to so many degrees before they are compared, so that the corners of a square count
 # as equal whatever the rounding of their coordinates.
@@ -47,11 +47,12 @@ class _Scale(NamedTuple):
     lengths: float
     of_loop: float
     of_open: float
+    from_end: float  # how far from the ends of a curve, in target lengths, its corners begin
 
 
-_FINE = _Scale(0.5, SHORT_SHARE, SHORT_SHARE)
-_FAR = _Scale(1.5, 3.0 * SHORT_SHARE, 0.5)  # where corners are told from zigzags
-_COARSE = _Scale(2.0, SHORT_SHARE, 2.0 * SHORT_SHARE)  # along zigzags
+_FINE = _Scale(0.5, SHORT_SHARE, SHORT_SHARE, 0.0)
+_FAR = _Scale(1.5, 3.0 * SHORT_SHARE, 0.5, 0.0)  # where corners are told from zigzags
+_COARSE = _Scale(2.0, SHORT_SHARE, 2.0 * SHORT_SHARE, 1.0)  # along zigzags
 
 
 class _Path(NamedTuple):
@@ -168,6 +169,9 @@ def _reach(X, path, n, is_loop, i, scale):
 @inlined
 def _sharp_turn(X, path, n, is_loop, i, limit, scale):
     """Turn in degrees where it is sharp and local, otherwise 0."""
+    from_end = min(path.at[i], path.at[n] - path.at[i])
+    if not is_loop and from_end < scale.from_end * X[path.vertex[i], 3]:
+        return 0.0
     reach = _reach(X, path, n, is_loop, i, scale)
     near = _turn(X, path, n, is_loop, i, reach)
     if near <= limit:

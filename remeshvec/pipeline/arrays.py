@@ -38,8 +38,6 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
     watch = Stopwatch()
     recipe = make_recipe(options)
     sizing, wanted = read_sizing(L, options)
-    if options.callback is not None:
-        function(options.callback, "callback")
     with watch.time("check"):
         vertices, faces = as_mesh(V, F)
         _check_number(len(vertices), len(faces))
@@ -78,7 +76,9 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
 
 
 def read_sizing(L: Any, options: RemeshOptions) -> tuple[Sizing, tuple[str, int] | None]:
-    """Check what the caller says about sizes; a number of faces or vertices is returned beside it."""
+    """Check the callback and what is said about sizes; a number of faces or vertices comes beside it."""
+    if options.callback is not None:
+        function(options.callback, "callback")
     wanted = _wanted_count(L, options)
     gradation = check_gradation(options.gradation)
     return Sizing(L, gradation, count(options.max_faces, "max_faces")), wanted

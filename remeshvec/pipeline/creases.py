@@ -15,7 +15,7 @@ from ..core.stopwatch import Stopwatch
 from ..core.threads import thread_scope
 from ..core.vocabulary import NONE, IntArray
 from ..input.constraints import make_constraints
-from ..input.options import RemeshKeywords, read_options
+from ..input.options import RemeshKeywords, read_options, with_options
 from ..input.prepare import prepare
 from ..input.recipe import make_recipe
 from ..output.input_edges import input_numbers, vertices_of_edges
@@ -53,6 +53,7 @@ def find_creases(
 ) -> tuple[IntArray, dict[str, IntArray]]: ...
 
 
+@with_options
 def find_creases(
     V: ArrayLike,
     F: ArrayLike,
