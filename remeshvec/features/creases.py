@@ -141,8 +141,10 @@ def judge_edges(
         found = turns.edges[~is_feature[turns.edges]]
         if angle != "auto":
             found = found[_cosines(turns.normals, twin, found) <= least_cosine(least_turn(angle))]
-        elif len(found):
-            rank = _judge(surface, turns, is_feature, found, mean_edge, parallel)
+        else:
+            rank = np.empty(0, np.int8)
+            if len(found):
+                rank = _judge(surface, turns, is_feature, found, mean_edge, parallel)
             dropped = {name: found[np.isin(rank, why)] for name, why in DROPPED.items()}
             found = found[rank > 0]
         is_feature[found] = True
