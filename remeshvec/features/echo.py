@@ -40,13 +40,14 @@ AWAY = 0.3
 # A walk unfolds at most so many edges.
 MAX_STEPS = 24
 
-# In target lengths: facets narrower than the first are curvature at the scale of the new mesh;
-# beside a clean edge the second.
+# In target lengths: facets narrower than the first are curvature at the scale of the new mesh; beside a
+# clean edge the second, on a part the third.
 ECHO_REACH = 1.5
 CLEAN_REACH = 1.25
 FACET_REACH = 0.75
 
-# A clean edge that turns by more degrees than this is drawn, not tessellated, whatever is beside it.
+# On a part an edge that turns by more degrees than this is drawn, not tessellated, whatever is beside it:
+# facets of a nut, chamfers, both rims of a groove.
 DRAWN_TURN = 40.0
 
 
@@ -62,7 +63,7 @@ def drop_echoes(ground: Ground, candidates: Candidates, parallel: bool) -> None:
 
 
 def restore_facets(ground: Ground, candidates: Candidates, parallel: bool) -> None:
-    """Give the edges of wide facets their class back: on a part they are those of a prism."""
+    """Give the edges of wide or sharp facets their class back: on a part they are those of a prism."""
     curved = np.flatnonzero(candidates.rank == CURVED)
     is_facet = np.empty(len(curved), np.bool_)
     _mark_facets(parallel, candidates.edges[curved], ground, candidates.turn[curved], is_facet)

@@ -21,20 +21,22 @@ from .walks import PARALLEL, cross_face, edge_vector, is_convex
 
 __all__ = ["drop_terraces"]
 
-# Steeper edges are those of a part.
+# Steeper edges are those of a part; those of whole voxels turn by 90 degrees.
 TERRACE_TURN = 100.0
 
 # Longer edges, in target lengths or mean edges, are not those of voxels.
 EDGE = 1.5
 
-# Within the first of these the same turn comes again, in target lengths; the one back lies at most the
-# second away from either.
+# A step: within the first of these, in target lengths, the same turn comes again; between the two lies a
+# turn back, at most the second away from one of them. A ledge has no second turn.
 REACH = 8.0
 GAP = 0.95
 
-# Where most clean edges are such steps, the surface is that of a mask: there a turn back is enough.
-MASK_GAP = 2.25
+# Where this share of the clean edges, by length, are steps, the surface is that of a mask: at least 0.6
+# on masks, at most 0.42 on 60 parts, whose steps are longer. There a turn back within the second is enough:
+# voxels may be taller than the target length.
 MASK_SHARE = 0.5
+MASK_GAP = 2.25
 
 # A set of connected edges is dropped if this share of its length belongs to steps.
 SHARE = 0.5
