@@ -33,8 +33,8 @@ REACH = 8.0
 GAP = 0.95
 
 # Where this share of the clean edges, by length, are steps, the surface is that of a mask: at least 0.6
-# on masks, at most 0.42 on 60 parts, whose steps are longer. There a turn back within the second is enough:
-# voxels may be taller than the target length.
+# on masks, at most 0.42 on 60 parts, whose steps are longer. There one turn back within the second is
+# enough: voxels may be taller than the target length.
 MASK_SHARE = 0.5
 MASK_GAP = 2.25
 
