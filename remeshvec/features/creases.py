@@ -50,7 +50,7 @@ DROPPED = {
     "crowded": (CROWDED,),
 }
 
-# Dropping one of a crowd leaves loose ends, so chains are judged again; a third time changes nothing.
+# Dropping one of a crowd leaves loose ends, so chains are judged again, at most so often.
 CROWD_ROUNDS = 2
 
 # X (n, 4) with the target length in its last column, origin and twin (3 m,), vertex_halfedge (n,).

@@ -30,8 +30,7 @@ def drop_acute(
 ) -> bool:
     """Take the class from kept edges that meet a surer one at an acute angle: on scans mostly flaws.
 
-    Such pairs are what makes slivers: without them the smallest angle of 7 of 13 scans rose by 8 to 40
-    degrees.
+    Such pairs make slivers: without them the smallest angle of six scans rose by 5 to 26 degrees.
 
     Parameters
     ----------
