@@ -31,6 +31,7 @@ LARGEST = 400_000  # bytes of a file
 FACES = ("#d3e3f3", "#f6d3b3", "#cfe6c8", "#f0c9d6", "#f1e6b0", "#d8d0ee")  # by label
 PLAIN, LOUD = "#e6e6e6", "#e0702f"  # faces left alone; the upper end of a scale
 DOTS = "#c2185b"
+KEPT = pictures.KEPT  # an ink for creases
 
 
 class Panel(NamedTuple):
@@ -43,6 +44,7 @@ class Panel(NamedTuple):
     lines: IntArray | None = None  # (k, 2) edges drawn thick
     dots: IntArray | None = None  # (k,) vertices
     note: str = ""
+    ink: str = pictures.EDGE  # of the lines
     texture: tuple[FloatArray, NDArray[np.uint8]] | None = None  # (m, 3, 2) on corners; the image
     close_up: tuple[FloatArray, float] | None = (
         None  # middle of what is seen; how many times larger
@@ -259,7 +261,7 @@ def _add(plotter: Any, pyvista: Any, panel: Panel, points: FloatArray, width: in
     if panel.lines is not None and len(panel.lines):
         pairs = np.insert(panel.lines, 0, 2, axis=1).ravel()
         lines = pyvista.PolyData(nearer, lines=pairs)
-        plotter.add_mesh(lines, color=pictures.EDGE, line_width=OVERSAMPLING * LINE, lighting=False)
+        plotter.add_mesh(lines, color=panel.ink, line_width=OVERSAMPLING * LINE, lighting=False)
     if panel.dots is not None and len(panel.dots):
         dots = pyvista.PolyData(nearer[panel.dots] + LIFT)
         size = OVERSAMPLING * DOT

@@ -20,6 +20,7 @@ from data.shapes.drawn import double_bubble, flag, half_discs, notched_sheet
 from remeshvec import Adaptive, remesh
 from remeshvec.files.data_files import read_data
 
+from . import creases
 from .films import catenoid, cube, rings, splitting
 from .meshes import load_arrays
 from .panels import (
@@ -228,6 +229,7 @@ PICTURES: dict[str, Callable[[], Picture]] = {
         catenoid,
         rings,
         splitting,
+        *creases.PICTURES,
     )
 }
 

@@ -22,6 +22,7 @@ from .measures.quality import Quality, quality
 from .output.defects import Defects
 from .output.report import Report
 from .output.result import RemeshResult
+from .pipeline.creases import find_creases
 from .pipeline.remesh import remesh
 from .sizing.adaptive import Adaptive
 
@@ -60,6 +61,7 @@ __all__ = [
     "cotangent_matrix",
     "deform",
     "fair",
+    "find_creases",
     "html_report",
     "laplacian",
     "quality",

@@ -74,6 +74,7 @@ PAGE = {"title": NOT_TEXTS, "command": NOT_TEXTS, "up": NOT_WORDS}
 PICTURE = {
     "before": NOT_MESHES,
     "after": NOT_MESHES,
+    "lines": [None, 3, ([[0, 1]],), (None, [[0, 99]]), ([0, 1], None), ([[0.5, 1]], None)],
     "titles": NOT_TITLES,
     "width": NOT_COUNTS,
     "up": NOT_WORDS,
@@ -95,6 +96,7 @@ REMESH = {
     "fit": NOT_FLAGS,
     "avoid_intersections": NOT_FLAGS,
     "feature_angle": [True, "1", "x", NAN, INF, -1.0, 181.0, [30.0], {}],
+    "corner_angle": [*NOT_POSITIVE, 181.0],
     "feature_edges": [
         "1", [0.5], [[0, 99]], [[0, -1]], [[0, 0.5]], [[0, 1, 2]], [[0], [1, 2]], [[0, 8]],
     ],
@@ -121,6 +123,10 @@ def result():
 
 TABLE = {
     remesh: Entry(REMESH, lambda: {"V": V, "F": F}),
+    remeshvec.find_creases: Entry(
+        {**{k: v for k, v in REMESH.items() if k != "return_result"}, "return_dropped": NOT_FLAGS},
+        lambda: {"V": V, "F": F},
+    ),
     remeshvec.quality: Entry(
         {"V": NOT_VERTICES, "F": NOT_FACES, "L": NOT_POSITIVE}, lambda: {"V": V, "F": F}
     ),

@@ -44,6 +44,24 @@ def prism(P: np.ndarray, height: float = 1.0, tilt=(0.0, 0.0), rows: int = 1) ->
     return basic.arrays(np.vstack([*levels, ends]), np.vstack(F))
 
 
+def chamfered_block(chamfer: float = 0.12, groove: float = 0.15) -> Arrays:
+    """Block of 3 x 2 x 1.2 with two chamfered edges and a groove across the middle of its top."""
+    c, g = chamfer, groove
+    profile = np.array(
+        [[1.5, 0.0], [1.5, 1.2 - c], [1.5 - c, 1.2], [g / 2, 1.2], [g / 2, 1.2 - g],
+         [-g / 2, 1.2 - g], [-g / 2, 1.2], [c - 1.5, 1.2], [-1.5, 1.2 - c], [-1.5, 0.0]]
+    )  # fmt: skip
+    n = len(profile)
+    V = np.vstack([np.insert(profile, 1, y, axis=1) for y in (-1.0, 1.0)])
+    cap = np.array(  # fans over the two halves of the profile, and the piece below the groove
+        [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 9], [9, 4, 5], [9, 5, 6], [9, 6, 7], [9, 7, 8]]
+    )
+    i = np.arange(n)
+    j = (i + 1) % n
+    sides = np.concatenate([np.stack([i, i + n, j + n], 1), np.stack([i, j + n, j], 1)])
+    return basic.outward(V, np.concatenate([cap, cap[:, ::-1] + n, sides]))
+
+
 def plate(n: int = 32, height: float = 0.5, m: int = 2) -> Arrays:
     """Square plate of side 4 with a round hole of radius 1; n a multiple of 8."""
     c = np.stack([np.cos(basic.turn(n)), np.sin(basic.turn(n))], axis=1)

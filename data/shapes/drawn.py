@@ -57,6 +57,26 @@ def flag(seed: int = 2) -> tuple[FloatArray, IntArray, IntArray]:
     return np.column_stack([x, y, 0.2 * np.sin(2.0 * x) + 0.1 * np.cos(2.4 * y)]), F, labels
 
 
+def tiles(seed: int = 3) -> tuple[FloatArray, IntArray, IntArray]:
+    """Wavy rectangle with two labels inside: a hexagon and a square; V, F, labels."""
+    rng = np.random.default_rng(seed)
+    corners = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.6], [0.0, 1.6], [0.0, 0.0]])
+    rim = [_between(a, b, 20) for a, b in pairwise(corners)]
+    middles = np.array([[0.85, 0.8], [2.2, 0.8]])
+    inside = []
+    for sides, middle in zip((6, 4), middles, strict=True):
+        t = 2 * np.pi * np.arange(sides + 1) / sides + 0.3
+        tile = middle + 0.58 * np.stack([np.cos(t), np.sin(t)], axis=1)
+        inside.append([_between(a, b, 36 // sides) for a, b in pairwise(tile)])
+    points = rng.uniform(0, 1, (420, 2)) * [3.0, 1.6]
+    P, F = triangulated(points, [*rim, *inside[0], *inside[1]])
+    labels = np.zeros(len(F), np.int64)
+    for k, lines in enumerate(inside):
+        labels[_is_inside(P[F].mean(axis=1), np.vstack([line[:-1] for line in lines]))] = k + 1
+    x, y = P.T
+    return np.column_stack([x, y, 0.2 * np.sin(2.0 * x) + 0.1 * np.cos(2.4 * y)]), F, labels
+
+
 def half_discs() -> Arrays:
     """Three half-discs on one line, as where three soap films meet."""
     r, t = np.meshgrid(np.linspace(0, 1, 7), np.linspace(0, np.pi, 25), indexing="ij")

@@ -17,7 +17,7 @@ from benchmarks.panels import (
     by_label,
     kept_faces,
 )
-from data.shapes.drawn import flag, notched_sheet
+from data.shapes.drawn import flag, notched_sheet, tiles
 from remeshvec import remesh
 
 from .scene import BRACKET, CREATURE, SHEET, panel, side_by_side
@@ -31,6 +31,18 @@ def feature_angle() -> Picture:
         for angle in ("auto", None)
     ]
     return side_by_side(panels, BRACKET)
+
+
+def corner_angle() -> Picture:
+    """Corners of a hexagon, which turn by 60 degrees, and of a square, 90."""
+    V, F, labels = tiles()
+    panels = []
+    for angle in (None, 75.0, 180.0):
+        result = remesh(V, F, 0.14, face_labels=labels, corner_angle=angle)
+        colours = by_label(result.face_labels)
+        caption = f"corner_angle={angle}"
+        panels.append(panel(caption, result, colours, dots=result.corners))
+    return side_by_side(panels, SHEET, 3)
 
 
 def feature_edges() -> Picture:
@@ -164,6 +176,6 @@ def shortest_path(V: FloatArray, F: IntArray, start: int, end: int) -> IntArray:
 
 
 PICTURES = (
-    feature_angle, feature_edges, fixed_vertices, fixed_faces, face_labels, preserve, selection, boundary,
-    return_result,
+    feature_angle, corner_angle, feature_edges, fixed_vertices, fixed_faces, face_labels, preserve,
+    selection, boundary, return_result,
 )  # fmt: skip

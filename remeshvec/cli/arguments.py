@@ -213,6 +213,12 @@ def _add_constraints(group: argparse._ArgumentGroup) -> None:
         help="keep edges that turn by more; auto: edges that stand out (default), none: no edges",
     )
     group.add_argument(
+        "--corner-angle",
+        type=_positive_number,
+        metavar="DEG",
+        help="keep corners where an edge, border or boundary turns by more over L (default 50)",
+    )
+    group.add_argument(
         "--boundary",
         choices=get_args(Boundary),
         default="free",

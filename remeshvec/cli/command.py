@@ -113,7 +113,8 @@ def _run(options: argparse.Namespace) -> int:
     if options.visualize:
         from .. import viz
 
-        viz.show((mesh.V, mesh.F), (result.V, result.F), up=options.up)
+        lines = (result.input_feature_edges, result.feature_edges)
+        viz.show((mesh.V, mesh.F), (result.V, result.F), lines=lines, up=options.up)
     return 0
 
 
@@ -216,7 +217,9 @@ def _progress(quiet: bool) -> Iterator[ProgressLine | None]:
 def _make_picture(options: argparse.Namespace, mesh: MeshFile, result: RemeshResult) -> None:
     from .. import viz
 
-    viz.picture(options.picture, (mesh.V, mesh.F), (result.V, result.F), up=options.up)
+    lines = (result.input_feature_edges, result.feature_edges)
+    before, after = (mesh.V, mesh.F), (result.V, result.F)
+    viz.picture(options.picture, before, after, lines=lines, up=options.up)
 
 
 def _write_page(options: argparse.Namespace, result: RemeshResult) -> None:

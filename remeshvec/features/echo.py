@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from math import cos, sqrt
+from math import cos, radians
 
 import numpy as np
 
-from ..core.compiler import inlined
-from ..core.geometry import distance_squared
+from ..core.compiler import inlined, threaded
 from ..core.vocabulary import NONE
-from ..mesh.walk import next_halfedge, previous_halfedge
+from ..mesh.walk import next_halfedge
+from .candidates import (
+    CLEAN,
+    CLEAN_RATIO,
+    CURVED,
+    ECHO,
+    PIECE,
+    STEEP_TURN,
+    Candidates,
+    Ground,
+    per_piece,
+)
 from .dihedral import face_cosine
+from .walks import PARALLEL, across, cross_face, edge_vector, is_convex
 
-__all__ = ["echo_cosines", "echoes_beside"]
+__all__ = ["drop_echoes", "echo_cosines", "echoes_beside"]
 
 # An echo turns by at least this share of our edge: with 0.6 a quarter more is kept on organic
 # shapes, and a fillet of two segments has a crease in its middle. What turns by this multiple of it
@@ -20,8 +31,8 @@ __all__ = ["echo_cosines", "echoes_beside"]
 ECHO_SHARE = 0.4
 MULTIPLE = 1.7
 
-# An edge met at more than 45 degrees to ours belongs to another direction of curvature.
-PARALLEL = 0.7
+# Edges at the ends of a fillet turn by less than this share of one inside.
+FILLET_SHARE = 0.65
 
 # A walk that turned by more than about 70 degrees in space is no longer beside its edge.
 AWAY = 0.3
@@ -29,65 +40,95 @@ AWAY = 0.3
 # A walk unfolds at most so many edges.
 MAX_STEPS = 24
 
+# In target lengths: facets narrower than the first are curvature at the scale of the new mesh; beside a
+# clean edge the second, on a part the third.
+ECHO_REACH = 1.5
+CLEAN_REACH = 1.25
+FACET_REACH = 0.75
 
-@inlined
-def _edge(X, origin, h):
-    """Vector along a half-edge, and its length."""
-    a, b = origin[h], origin[next_halfedge(h)]
-    x, y, z = X[b, 0] - X[a, 0], X[b, 1] - X[a, 1], X[b, 2] - X[a, 2]
-    return x, y, z, sqrt(x * x + y * y + z * z)
-
-
-@inlined
-def _is_convex(normals, f, g, x, y, z):
-    """Tell whether the surface bends away from its normals from face f on the left of an edge to g."""
-    nx = normals[f, 1] * normals[g, 2] - normals[f, 2] * normals[g, 1]
-    ny = normals[f, 2] * normals[g, 0] - normals[f, 0] * normals[g, 2]
-    nz = normals[f, 0] * normals[g, 1] - normals[f, 1] * normals[g, 0]
-    return nx * x + ny * y + nz * z > 0.0
+# On a part an edge that turns by more degrees than this is drawn, not tessellated, whatever is beside it:
+# facets of a nut, chamfers, both rims of a groove.
+DRAWN_TURN = 40.0
 
 
-@inlined
-def _unfolded_apex(X, origin, h, x, y, z, length):
-    """Third corner of the face of ``h``, from its origin: along the edge (x, y, z), and across."""
-    a, c = origin[h], origin[previous_halfedge(h)]
-    if length == 0.0:
-        return 0.0, sqrt(distance_squared(X, a, c))
-    wx, wy, wz = X[c, 0] - X[a, 0], X[c, 1] - X[a, 1], X[c, 2] - X[a, 2]
-    nx, ny, nz = y * wz - z * wy, z * wx - x * wz, x * wy - y * wx
-    along = wx * x + wy * y + wz * z
-    return along / length, sqrt(nx * nx + ny * ny + nz * nz) / length
+def drop_echoes(ground: Ground, candidates: Candidates, parallel: bool) -> None:
+    """Take the class from edges whose turn repeats beside them.
 
+    In noise one echo is enough. A clean turn that comes twice makes a chamfer or a land; if it comes
+    three times it is curvature.
 
-@inlined
-def _across(normals, f, x, y, z):
-    """Vector into a face, perpendicular to its edge (x, y, z) and as long."""
-    nx, ny, nz = normals[f, 0], normals[f, 1], normals[f, 2]
-    return ny * z - nz * y, nz * x - nx * z, nx * y - ny * x
-
-
-@inlined
-def _exit(x, y, length, at, u, w):
-    """Leave the triangle (0, 0), (length, 0), (x, y) from (``at``, 0) along (u, w).
-
-    Returns whether the ray meets the last side (from the apex to the origin), the distance, the
-    parameter on that side in [0, 1] and the direction of it, both as the next triangle sees them.
+    All are judged by what the surface is, so the order does not matter.
     """
-    is_last = w * (x - at) > u * y
-    if is_last:
-        below = x * w - u * y
-        share = at * w / below if below > 0.0 else 0.0
-        dx, dy = x, y
-    else:
-        below = u * y - (x - length) * w
-        share = (length - at) * w / below if below > 0.0 else 0.0
-        dx, dy = length - x, -y
-    share = min(1.0, max(0.0, share))
-    side = sqrt(dx * dx + dy * dy)
-    distance = share * y / w
-    if side > 0.0:
-        dx, dy = dx / side, dy / side
-    return is_last, distance, share if is_last else 1.0 - share, dx, dy
+    _drop(parallel, candidates.edges, ground, candidates.turn, candidates.rank)
+
+
+def restore_facets(ground: Ground, candidates: Candidates, parallel: bool) -> None:
+    """Give the edges of wide or sharp facets their class back: on a part they are those of a prism."""
+    curved = np.flatnonzero(candidates.rank == CURVED)
+    is_facet = np.empty(len(curved), np.bool_)
+    _mark_facets(parallel, candidates.edges[curved], ground, candidates.turn[curved], is_facet)
+    facets = curved[is_facet]
+    candidates.rank[facets] = np.where(candidates.ratio[facets] >= CLEAN_RATIO, CLEAN, ECHO)
+
+
+@threaded(per_piece)
+def _drop(span, edges, ground, turn, rank):
+    for k in range(PIECE * span[0], min(PIECE * span[1], len(edges))):
+        if rank[k] <= 0 or turn[k] >= STEEP_TURN:
+            continue
+        is_clean = rank[k] == CLEAN
+        echoes = _echoes(ground, edges[k], turn[k], CLEAN_REACH if is_clean else ECHO_REACH)
+        if echoes == 2:
+            rank[k] = CURVED
+        elif echoes == 1 and not is_clean:
+            rank[k] = ECHO
+
+
+@threaded(per_piece)
+def _mark_facets(span, edges, ground, turn, is_facet):
+    for k in range(PIECE * span[0], min(PIECE * span[1], len(edges))):
+        if turn[k] >= DRAWN_TURN:
+            is_facet[k] = not _is_inside_fillet(ground, edges[k], turn[k])
+        else:
+            is_facet[k] = _echoes(ground, edges[k], turn[k], FACET_REACH) < 2
+
+
+@inlined
+def _target(ground, h):
+    """Target length at an edge."""
+    a, b = ground.origin[h], ground.origin[next_halfedge(h)]
+    return 0.5 * ground.X[a, 3] + 0.5 * ground.X[b, 3]
+
+
+@inlined
+def _echoes(ground, h, turn, reach):
+    """Count how often a turn comes again, up to 2, on both sides together.
+
+    Once is enough where the walk ends at the border on the other side: there might be more of them.
+    """
+    quiet, loud = echo_cosines(radians(turn))
+    reach = reach * _target(ground, h)
+    total = 0
+    open_sides = 0
+    for g in (h, np.int64(ground.twin[h])):
+        if total < 2:
+            echoes, is_cut_short = echoes_beside(ground, g, reach, quiet, loud, 2)
+            total += echoes
+            open_sides += echoes == 0 and not is_cut_short
+    return 2 if total == 1 and open_sides == 0 else min(total, 2)
+
+
+@inlined
+def _is_inside_fillet(ground, h, turn):
+    """Tell whether a drawn edge has a smaller turn to the same side on both of its sides.
+
+    So a fillet of two segments has; facets of a prism all turn alike.
+    """
+    quiet, loud = cos(radians(ECHO_SHARE * turn)), cos(radians(FILLET_SHARE * turn))
+    reach = CLEAN_REACH * _target(ground, h)
+    left, _ = echoes_beside(ground, h, reach, quiet, loud, 1)
+    right, _ = echoes_beside(ground, np.int64(ground.twin[h]), reach, quiet, loud, 1)
+    return left + right == 2
 
 
 @inlined
@@ -97,7 +138,7 @@ def echo_cosines(turn):
 
 
 @inlined
-def echoes_beside(X, origin, twin, normals, is_hard, h, reach, quiet, loud, enough):
+def echoes_beside(ground, h, reach, quiet, loud, enough):
     """Count how often the turn across ``h`` comes again, straight into its face, up to ``enough``.
 
     The walk runs over unfolded faces from the middle of the edge, perpendicular to it, for a length
@@ -111,33 +152,33 @@ def echoes_beside(X, origin, twin, normals, is_hard, h, reach, quiet, loud, enou
     is_cut_short : bool
         Whether the walk ended where the face does, so that there might be more of them.
     """
-    ex, ey, ez, length = _edge(X, origin, h)
+    X, origin, twin, normals, is_hard = ground
+    vector = edge_vector(X, origin, h)
+    ex, ey, ez, length = vector
     f = h // 3
-    convex = _is_convex(normals, f, twin[h] // 3, ex, ey, ez)
-    x0, y0, z0 = _across(normals, f, ex, ey, ez)
+    convex = is_convex(normals, f, twin[h] // 3, ex, ey, ez)
+    x0, y0, z0 = across(normals, f, ex, ey, ez)
     away = AWAY * length
     echoes = 0
     left = reach
     g = h
     share, u, w = 0.5, 0.0, 1.0
     for _ in range(MAX_STEPS):
-        x, y = _unfolded_apex(X, origin, g, ex, ey, ez, length)
-        is_last, distance, share, dx, dy = _exit(x, y, length, share * length, u, w)
+        g, distance, share, u, w = cross_face(ground, g, vector, share, u, w)
         left -= distance
         if left < 0.0:
             return echoes, False
-        g = previous_halfedge(g) if is_last else next_halfedge(g)
         t = np.int64(twin[g])
         if t == NONE or is_hard[g]:
             return echoes, True
-        u, w = u * dx + w * dy, max(abs(u * dy - w * dx), 1e-9)
         before, f = f, t // 3
-        ex, ey, ez, length = _edge(X, origin, t)
+        vector = edge_vector(X, origin, t)
+        ex, ey, ez, length = vector
         cosine = face_cosine(normals, before, f)
         if cosine <= quiet and w >= PARALLEL:
             if cosine <= loud:
                 return echoes, True
-            if _is_convex(normals, before, f, -ex, -ey, -ez) != convex:
+            if is_convex(normals, before, f, -ex, -ey, -ez) != convex:
                 return echoes, False
             echoes += 1
             left = reach
@@ -145,7 +186,7 @@ def echoes_beside(X, origin, twin, normals, is_hard, h, reach, quiet, loud, enou
                 return echoes, False
         g = t
         if echoes == 0:
-            xa, ya, za = _across(normals, f, ex, ey, ez)
+            xa, ya, za = across(normals, f, ex, ey, ez)
             along = u * (ex * x0 + ey * y0 + ez * z0) + w * (xa * x0 + ya * y0 + za * z0)
             if not along >= away * length:
                 return echoes, False

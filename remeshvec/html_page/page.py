@@ -58,8 +58,8 @@ def html_report(result: RemeshResult, *, title: str = "", command: str = "", up:
 
     The page has both meshes in linked 3D views, coloured by shape, smallest angle or area of the faces;
     overlaid histograms of edge lengths, angles, valences and areas; the measures; the options, sweeps
-    and version. For meshes with more than 200,000 faces the views show a part, and above 50,000 faces
-    they leave edges out. The page says so.
+    and version. Creases and other curves that were kept are red. For meshes with more than 200,000
+    faces the views show a part, and above 50,000 faces they leave edges out. The page says so.
 
     Parameters
     ----------
@@ -90,7 +90,8 @@ def html_report(result: RemeshResult, *, title: str = "", command: str = "", up:
     plotly = require_plotly()
     qualities = (report.quality_before, report.quality_after)
     measured = (elements(*report.before), elements(*report.after))
-    views = build_views(measured, qualities, report.target_length, up)
+    curves = (result.input_feature_edges, result.feature_edges)
+    views = build_views(measured, curves, qualities, report.target_length, up)
     charts = build_charts(measured, qualities, report.target_length)
     return Template(_part("report.html")).substitute(
         title=_text(title or "Remeshing report"),

@@ -21,6 +21,7 @@
   const meshes = scene.meshes.map((packed) => ({
     vertices: unpack(packed.vertices, Float32Array),
     faces: unpack(packed.faces, Uint32Array),
+    curves: unpack(packed.curves, Uint32Array),
     sides: packed.sides,
     levels: Object.fromEntries(
       Object.entries(packed.levels).map(([key, text]) => [key, unpack(text, Uint8Array)])
@@ -62,8 +63,7 @@
 
   // Rounding would hide edges that lie in the faces, so they are drawn a little above them: on the
   // outside of a closed surface, else on both sides.
-  function edgeTrace(mesh, view) {
-    const ends = edgesOf(mesh);
+  function edgeTrace(mesh, ends, line) {
     const normals = normalsOf(mesh);
     const count = ends[0].length;
     const at = [0, 1, 2].map(() => new Float32Array(3 * mesh.sides.length * count).fill(NaN));
@@ -79,8 +79,14 @@
     });
     return {
       type: "scatter3d", mode: "lines", x: at[0], y: at[1], z: at[2], connectgaps: false,
-      hoverinfo: "skip", line: wire(mesh, view),
+      hoverinfo: "skip", line,
     };
+  }
+
+  // Curves that were kept, in red.
+  function curveTrace(mesh) {
+    const ends = [0, 1].map((c) => mesh.curves.filter((_, at) => at % 2 === c));
+    return edgeTrace(mesh, ends, { color: style("--kept"), width: 4 });
   }
 
   // Thin lines, fainter where they are too dense to tell apart.
@@ -238,7 +244,8 @@
 
   async function drawView(view, mesh) {
     const traces = [faceTrace(mesh, scene.colourings[0])];
-    if (scene.edges) traces.push(edgeTrace(mesh, view));
+    if (scene.edges) traces.push(edgeTrace(mesh, edgesOf(mesh), wire(mesh, view)));
+    if (mesh.curves.length) traces.push(curveTrace(mesh));
     await Plotly.newPlot(view, mesh.faces.length ? traces : [], viewLayout(view), config);
   }
 

@@ -57,7 +57,11 @@ class Views(NamedTuple):
 
 
 def build_views(
-    meshes: tuple[Elements, Elements], qualities: tuple[Quality, Quality], length: float, up: str
+    meshes: tuple[Elements, Elements],
+    curves: tuple[IntArray, IntArray],
+    qualities: tuple[Quality, Quality],
+    length: float,
+    up: str,
 ) -> Views:
     """Make the scene of two meshes under one camera.
 
@@ -65,6 +69,8 @@ def build_views(
     ----------
     meshes : (Elements, Elements)
         The meshes before and after.
+    curves : ((k, 2) int, (j, 2) int)
+        Their edges on creases and other curves, which are drawn in red.
     qualities : (Quality, Quality)
         Measures of the same meshes; the sign of the volume shows which side is outside.
     length : float
@@ -88,8 +94,12 @@ def build_views(
     faces = max(map(len, shown))
     scene = {
         "meshes": [
-            {**_mesh(mesh, kept, middle, reach, length), "sides": _sides(quality)}
-            for mesh, kept, quality in zip(meshes, shown, qualities, strict=True)
+            {
+                **_mesh(mesh, kept, middle, reach, length),
+                "curves": _shown_curves(edges, mesh.F[kept]),
+                "sides": _sides(quality),
+            }
+            for mesh, edges, kept, quality in zip(meshes, curves, shown, qualities, strict=True)
         ],
         "camera": {
             "eye": camera.eye.tolist(),
@@ -137,6 +147,14 @@ def _mesh(
             for name, level in levels.items()
         },
     }
+
+
+def _shown_curves(edges: IntArray, F: IntArray) -> str:
+    """Return the edges whose ends are shown, in the numbers of `_mesh`."""
+    used = np.unique(F)
+    place = np.minimum(np.searchsorted(used, edges), max(len(used) - 1, 0))
+    is_shown = (used[place] == edges).all(axis=1) if len(used) else np.zeros(len(edges), np.bool_)
+    return _packed(place[is_shown], "<u4")
 
 
 def _sides(quality: Quality) -> list[int]:

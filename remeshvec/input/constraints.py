@@ -17,7 +17,7 @@ from ..mesh.mend import Kept
 from ..mesh.walk import ends_of
 from .options import Boundary, RemeshOptions
 
-__all__ = ["ConstraintMasks", "Constraints", "make_constraints"]
+__all__ = ["ConstraintMasks", "Constraints", "corners_at", "make_constraints"]
 
 
 class ConstraintMasks(NamedTuple):
@@ -34,6 +34,7 @@ class Constraints:
     """What must stay, in terms of the input's vertices and faces."""
 
     feature_angle: float | str | None  # "auto", degrees, or None
+    corner_angle: float | None  # degrees, or None
     boundary: str
     feature_edges: NDArray[np.int64]  # (k, 2)
     fixed_vertices: NDArray[np.int64]  # (k,)
@@ -104,7 +105,7 @@ class Constraints:
         is_jump = np.zeros(len(h), np.bool_)
         for v in ends_of(mesh.origin, h):
             ours, theirs = (
-                self._corners(face_source[side // 3], vertex_source[v], representative)
+                corners_at(self.F, face_source[side // 3], vertex_source[v], representative)
                 for side in (h, t)
             )
             for values in self.on_corners:
@@ -112,12 +113,6 @@ class Constraints:
         jumps = np.zeros(len(mesh.twin), np.bool_)
         jumps[h[is_jump]] = jumps[t[is_jump]] = True
         return jumps
-
-    def _corners(self, face: NDArray[Any], v: IndexArray, representative: Any) -> NDArray[np.int64]:
-        """Corners ``3 * face + c`` of the input at vertices of faces; -1 where a face was cut."""
-        corners = self.F[face] if representative is None else representative[self.F[face]]
-        is_here = corners == v[:, None]
-        return np.where(is_here.any(axis=1), 3 * face + is_here.argmax(axis=1), -1)
 
     def kept(self, n: int) -> Kept:
         """Vertices and faces of the input, of ``n`` vertices, that stay exactly as they are."""
@@ -132,6 +127,15 @@ class Constraints:
             vertices[ends[uses == 1]] = True
             faces |= vertices[self.F].sum(axis=1) >= 2
         return Kept(vertices, faces)
+
+
+def corners_at(
+    F: NDArray[Any], face: NDArray[Any], v: NDArray[Any], representative: Any
+) -> NDArray[np.int64]:
+    """Corners ``3 * face + c`` of the input at vertices of faces; -1 where a face was cut."""
+    corners = F[face] if representative is None else representative[F[face]]
+    is_here = corners == v[:, None]
+    return np.where(is_here.any(axis=1), 3 * face + is_here.argmax(axis=1), -1)
 
 
 def _halfedges_between(
@@ -179,6 +183,7 @@ def make_constraints(n: int, F: NDArray[np.int64], options: RemeshOptions) -> Co
     fixed, unselected = _kept_faces(options, len(F))
     return Constraints(
         _feature_angle(options.feature_angle),
+        _corner_angle(options.corner_angle),
         choice(options.boundary, "boundary", get_args(Boundary)),
         _feature_edges(options.feature_edges, n, F),
         _fixed_vertices(options.fixed_vertices, n),
@@ -266,6 +271,14 @@ def _feature_angle(value: Any) -> float | str | None:
         raise OptionError(
             f'feature_angle must be "auto", None or degrees between 0 and 180; got {value!r}'
         ) from None
+
+
+def _corner_angle(value: Any) -> float | None:
+    return (
+        None
+        if value is None
+        else number(value, "corner_angle", above=0.0, high=180.0, unit="degrees")
+    )
 
 
 def _feature_edges(value: Any, n: int, F: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -53,6 +53,7 @@ class RemeshOptions:
     max_deviation: float | None = None
     # What to keep.
     feature_angle: FeatureAngle = "auto"
+    corner_angle: float | None = None
     feature_edges: ArrayLike | None = None
     fixed_vertices: ArrayLike | None = None
     fixed_faces: FaceChoice | None = None
@@ -86,6 +87,7 @@ class RemeshKeywords(TypedDict, total=False):
     gradation: float
     max_deviation: float | None
     feature_angle: FeatureAngle
+    corner_angle: float | None
     feature_edges: ArrayLike | None
     fixed_vertices: ArrayLike | None
     fixed_faces: FaceChoice | None

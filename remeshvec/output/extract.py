@@ -39,6 +39,7 @@ from ..reference.build import FeaturedReference
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_vertices
 from ..reference.surface import Reference
+from .input_edges import feature_edges, input_numbers
 from .records import Births, Provenance
 
 __all__ = ["Output", "extract", "locate"]
@@ -59,6 +60,7 @@ class Output:
     vertex_map: Callable[[], IntArray]
     face_map: Callable[[], IntArray]
     feature_edges: Callable[[], IntArray]
+    input_feature_edges: Callable[[], IntArray]
     corners: Callable[[], IntArray]
     lengths: FloatArray
 
@@ -146,6 +148,13 @@ def extract(
         partial(_spread_to_input, len(V), born_at, fixed, prepared.representative),
         partial(_spread_to_input, n_faces, *face_map),
         partial(_sorted_pairs, ends),
+        partial(
+            feature_edges,
+            featured.reference.origin,
+            featured.features,
+            featured.names,
+            input_numbers(prepared, constraints.F),
+        ),
         partial(np.unique, fixed),
         lengths,
     )

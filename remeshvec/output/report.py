@@ -40,7 +40,9 @@ class Report:
         What was wrong with the input, and how often; empty for a clean mesh.
     features : dict
         Creases of the input that are kept: "crease_edges", "chains", "corners", and how many edges the
-        rule of ``feature_angle="auto"`` dropped: "dropped_echo", "dropped_noise", "dropped_short".
+        rule of ``feature_angle="auto"`` dropped: "dropped_noise" (it does not
+        stand out), "dropped_echo" (the turn repeats beside it), "dropped_terrace" (a step of voxels),
+        "dropped_short" (its chain is short or unsure), "dropped_crowded" (a surer crease is too close).
     deviation : dict
         With ``max_deviation`` or an adaptive length, the largest distance found: "to_input" from
         samples of the result (21 a face, on a grid) to the input, and "from_input" from such samples of

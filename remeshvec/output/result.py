@@ -54,6 +54,7 @@ class RemeshResult:
     _vertex_map: Lazy[IntArray] = field(repr=False, compare=False)
     _face_map: Lazy[IntArray] = field(repr=False, compare=False)
     _feature_edges: Lazy[IntArray] = field(repr=False, compare=False)
+    _input_feature_edges: Lazy[IntArray] = field(repr=False, compare=False)
     _corners: Lazy[IntArray] = field(repr=False, compare=False)
 
     def __iter__(self) -> Iterator[NDArray[Any]]:
@@ -142,6 +143,11 @@ class RemeshResult:
     def feature_edges(self) -> IntArray:
         """Edges on creases, boundaries, borders of labels, and where sheets meet, (k, 2)."""
         return self._feature_edges()
+
+    @property
+    def input_feature_edges(self) -> IntArray:
+        """The same of the input: its edges that were kept, (k, 2), as vertices of the input."""
+        return self._input_feature_edges()
 
     @property
     def corners(self) -> IntArray:

@@ -30,17 +30,14 @@ from ..sweeps.monitor import Monitor
 from ..sweeps.work import is_large
 from .job import Job, Remeshed, Sizing, meet_count
 
-__all__ = ["remesh_arrays"]
+__all__ = ["read_sizing", "remesh_arrays"]
 
 
 def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResult:
     """Remesh arrays."""
     watch = Stopwatch()
     recipe = make_recipe(options)
-    wanted = _wanted_count(L, options)
-    sizing = Sizing(L, check_gradation(options.gradation), count(options.max_faces, "max_faces"))
-    if options.callback is not None:
-        function(options.callback, "callback")
+    sizing, wanted = read_sizing(L, options)
     with watch.time("check"):
         vertices, faces = as_mesh(V, F)
         _check_number(len(vertices), len(faces))
@@ -76,6 +73,15 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
             stacklevel=3,
         )
     return _result(V2, out, report)
+
+
+def read_sizing(L: Any, options: RemeshOptions) -> tuple[Sizing, tuple[str, int] | None]:
+    """Check the callback and what is said about sizes; a number of faces or vertices comes beside it."""
+    if options.callback is not None:
+        function(options.callback, "callback")
+    wanted = _wanted_count(L, options)
+    gradation = check_gradation(options.gradation)
+    return Sizing(L, gradation, count(options.max_faces, "max_faces")), wanted
 
 
 def _check_number(n: int, m: int) -> None:
@@ -134,7 +140,8 @@ def _result(V: Any, out: Output, report: Report) -> RemeshResult:
         LazyRecipe(partial(face_births, provenance)),
         LazyRecipe(partial(corner_births, provenance)),
         LazyRecipe(partial(images, provenance)),
-        Lazy(out.vertex_map), Lazy(out.face_map), Lazy(out.feature_edges), Lazy(out.corners),
+        Lazy(out.vertex_map), Lazy(out.face_map), Lazy(out.feature_edges),
+        Lazy(out.input_feature_edges), Lazy(out.corners),
     )  # fmt: skip
 
 

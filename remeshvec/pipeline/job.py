@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from ..core.vocabulary import EQUILATERAL_AREA, LARGEST_MESH, FloatArray, Mesh
 from ..errors import OptionError
-from ..input.constraints import Constraints
+from ..features.creases import Creases, judge_edges
+from ..input.constraints import ConstraintMasks, Constraints
 from ..input.prepare import Prepared
 from ..input.recipe import Recipe
 from ..reference.build import FeaturedReference, build_reference
@@ -135,6 +136,19 @@ class Job:
         """Remesh a copy of the mesh."""
         return self._sweep([self.prepared.mesh.copy()], self.sizing.L if L is None else L)
 
+    def first_length(self, noun: str, wanted: int) -> float:
+        """Return the length that gives so many faces or vertices if all faces are equilateral."""
+        faces = wanted if noun == "faces" else 2 * wanted
+        return sqrt(self.size.area / faces / EQUILATERAL_AREA) / self.prepared.scale
+
+    def find_creases(self, L: Lengths | None) -> Creases:
+        """Find the features of the mesh, which gets its lengths."""
+        mesh = self.prepared.mesh
+        marks, _ = self._set_lengths(mesh, self.sizing.L if L is None else L)
+        surface = mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge
+        angle, mean_edge = self.constraints.feature_angle, self.size.mean_edge
+        return judge_edges(surface, marks.hard, angle, mean_edge, parallel=self.parallel)
+
     def _sweep(self, meshes: list[Mesh], L: Lengths | None) -> Remeshed:
         """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
         monitor = self.monitor
@@ -223,22 +237,36 @@ class Job:
 
     def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
         """Set the lengths of a mesh, mark its features, build the reference."""
+        marks, length = self._set_lengths(mesh, L)
+        featured = build_reference(
+            mesh,
+            self.prepared.vertex_source,
+            self.constraints.feature_angle,
+            marks,
+            self.size.mean_edge,
+            self.parallel,
+            self.constraints.corner_angle,
+        )
+        return featured, length
+
+    def _set_lengths(self, mesh: Mesh, L: Lengths | None) -> tuple[ConstraintMasks, float]:
+        """Set the lengths of a mesh; returns what must stay, and the length of the mean new edge."""
         prepared, constraints = self.prepared._replace(mesh=mesh), self.constraints
-        source, angle = prepared.vertex_source, constraints.feature_angle
-        marks = constraints.on_mesh(mesh, source, prepared.face_source, prepared.representative)
+        marks = constraints.on_mesh(
+            mesh, prepared.vertex_source, prepared.face_source, prepared.representative
+        )
         length = set_lengths(
             prepared,
             self.size,
             self.V,
             L,
             marks,
-            angle,
+            constraints.feature_angle,
             self.sizing.gradation,
             self.sizing.max_faces,
             self.recipe.max_deviation,
         )
-        mean_edge = self.size.mean_edge
-        return build_reference(mesh, source, angle, marks, mean_edge, self.parallel), length
+        return marks, length
 
 
 def _most_faces(allowed: int) -> int:
@@ -300,7 +328,7 @@ def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
         )
     goal = Count(noun, wanted)
     job.plan = replace(job.plan, count=goal)
-    L = sqrt(job.size.area / faces / EQUILATERAL_AREA) / job.prepared.scale
+    L = job.first_length(noun, wanted)
     best = None
     for _ in range(_TRIES):
         done = job.run(L)

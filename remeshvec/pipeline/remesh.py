@@ -73,10 +73,11 @@ def remesh(
     Parameters
     ----------
     V : (n, 3) float or int, or a mesh
-        Vertices; any array-like, never modified. Or a whole mesh, with ``L`` after it: a pair ``(V, F)``,
-        a ``trimesh.Trimesh``, ``pyvista.PolyData``, ``meshio.Mesh`` or ``open3d.geometry.TriangleMesh``.
-        Objects come back as objects of the same type, with colours, texture coordinates, fields and
-        groups; seams of textures and borders of groups are kept. Tensors of PyTorch come back as tensors.
+        Vertices; any array-like, never modified. Or a whole mesh, with ``L`` after it: a pair ``(V,
+        F)``, a ``trimesh.Trimesh``, ``pyvista.PolyData``, ``meshio.Mesh`` or
+        ``open3d.geometry.TriangleMesh``. Objects come back as objects of the same type, with colours,
+        texture coordinates, fields and groups; seams of textures and borders of groups are kept.
+        Tensors of PyTorch come back as tensors.
     F : (m, 3) int
         Triangles as 0-based indices; any array-like, never modified. Boundaries, several components,
         any genus, and edges with three or more faces are welcome: sheets share their vertices on such
@@ -84,8 +85,8 @@ def remesh(
         winding and pinched vertices are handled and listed in ``report.dirt``.
     L : float, (n,) array, callable or Adaptive, optional
         Target edge length in the units of ``V``: for all edges, at each input vertex, as a function of
-        points (k, 3), or from the curvature. 0.9 times the mean edge length by default. For objects, this
-        and the options that take data on faces may name data that the object carries.
+        points (k, 3), or from the curvature. 0.9 times the mean edge length by default. For objects,
+        this and the options that take data on faces may name data that the object carries.
     return_result : bool
         With a mesh object, return a pair of the new object and the `RemeshResult`.
     n_faces, n_vertices : int, optional
@@ -101,6 +102,10 @@ def remesh(
         Which creases to keep. ``"auto"``: those that turn more than their surroundings at the scale of
         ``L``, so that a part keeps its edges and a scan does not freeze its noise. Degrees: all edges
         whose faces turn by more. None: no creases.
+    corner_angle : float, optional
+        Degrees by which a curve (a crease, boundary or border of labels) must turn, at the scale of
+        ``L``, for a corner that stays. 50 by default, or ``feature_angle`` where that is a number. Ends
+        and junctions of curves stay whatever their angle.
     feature_edges : (k, 2) int, optional
         Edges of the input, as vertices, to keep as creases.
     fixed_vertices : (k,) int, optional
@@ -110,9 +115,9 @@ def remesh(
     face_labels : (m,) int, optional
         Borders between labels are kept as creases, and every new face gets its label.
     preserve : (m, 3, ...) or (m,) array, or a list of such arrays, optional
-        Data on corners of faces, as texture coordinates are, or on faces. Edges across which they differ
-        are kept as creases, so that no new face mixes two charts; `RemeshResult.transfer` brings them
-        over. Numbers that differ by less than 1e-6 of their range count as equal.
+        Data on corners of faces, as texture coordinates are, or on faces. Edges across which they
+        differ are kept as creases, so that no new face mixes two charts; `RemeshResult.transfer` brings
+        them over. Numbers that differ by less than 1e-6 of their range count as equal.
     selection : (k,) int or (m,) bool, optional
         Input faces to remesh. All others stay, and come first in the result, in their order.
     boundary : {"free", "split", "fixed"}
@@ -163,8 +168,8 @@ def remesh(
     Returns
     -------
     RemeshResult
-        Unpacks as ``V2, F2``; holds births, labels, features, maps and a report too, and transfers data.
-        For a mesh object an object of its type.
+        Unpacks as ``V2, F2``; holds births, labels, features, maps and a report too, and transfers
+        data. For a mesh object an object of its type.
 
     Raises
     ------

@@ -63,6 +63,7 @@ def build_reference(
     marks: ConstraintMasks,
     mean_edge: float,
     parallel: bool,
+    corner_angle: float | None = None,
 ) -> FeaturedReference:
     """Find the features of a mesh before its first sweep, mark them in it, and build the reference.
 
@@ -78,6 +79,9 @@ def build_reference(
     mean_edge : float
         Mean length of the edges.
     parallel : bool
+    corner_angle : float, optional
+        Degrees by which a curve turns at a corner; by default ``feature_angle`` where that is a number,
+        else 50.
     """
     origin, twin = mesh.origin.copy(), mesh.twin.copy()
     arrays = mesh.X, origin, twin
@@ -88,7 +92,9 @@ def build_reference(
     curves = link_chains(origin, twin, is_feature, len(mesh.X))
     members, group = find_siblings(mesh.X, origin, curves.edges[twin[curves.edges] == NONE])
     names = name_edges(twin, curves.edges, members, group, mesh.curve)
-    fixed = marks.fixed | find_corners(*arrays, curves, feature_angle)
+    fixed = marks.fixed | find_corners(
+        *arrays, curves, feature_angle if corner_angle is None else corner_angle
+    )
     on_non_manifold = None
     if len(members):
         on_non_manifold = np.zeros(len(mesh.X), np.bool_)

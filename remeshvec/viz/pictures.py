@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import arguments
-from ..core.check import as_array, as_mesh
+from ..core.check import as_array, as_indices, as_mesh
 from ..core.vocabulary import FloatArray, IntArray
 from ..errors import OptionError, RemeshvecError
 from ..files.disk import check_writable, write_file
@@ -35,6 +35,9 @@ Arrays = tuple[ArrayLike, ArrayLike]  # V (n, 3), F (m, 3)
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 BACKGROUND, FRONT, BACK, EDGE, TEXT = "white", "#d3e3f3", "#ecd5b8", "#1c2a3a", "#1c2a3a"
+KEPT = "#c8102e"  # curves that stay
+# Towards the eye, in half heights of the picture, so that faces do not hide the lines on them.
+LIFT = 0.004
 # The view is from the side that shows most, turned by a third of a right angle and slightly from above:
 # this shows depth and hides hardly any of the silhouette.
 TURN, ELEVATION = np.radians(28.0), np.radians(17.0)
@@ -73,6 +76,7 @@ class PictureScene(NamedTuple):
     """Two meshes with their titles, the direction of view and the visible part of space."""
 
     meshes: tuple[tuple[FloatArray, IntArray], tuple[FloatArray, IntArray]]
+    lines: tuple[IntArray, IntArray]  # (k, 2) edges of either that are drawn in red
     titles: tuple[str, str]
     camera: Camera
     frame: CameraFrame
@@ -83,6 +87,7 @@ def picture(
     before: Arrays,
     after: Arrays,
     *,
+    lines: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
     titles: tuple[str, str] = ("before", "after"),
     width: int = 1600,
     up: str = "y",
@@ -95,6 +100,9 @@ def picture(
         PNG or JPEG file; an existing file is replaced when the new one is complete.
     before, after : ((n, 3) float, (m, 3) int)
         Vertices and faces of the two meshes.
+    lines : ((k, 2) int or None, (j, 2) int or None)
+        Edges of the two meshes to draw in red, as vertices: ``(result.input_feature_edges,
+        result.feature_edges)`` shows which curves were kept.
     titles : (str, str)
         Titles above the meshes, before their numbers of faces.
     width : int
@@ -114,7 +122,7 @@ def picture(
         Another argument is invalid.
     """
     path = arguments.path(path, "path")
-    scene = _picture_scene(before, after, titles, width, up)
+    scene = _picture_scene((before, after), lines, titles, width, up)
     pyvista = require_viewer()
     check_writable(path, PICTURE_SUFFIXES)
     from PIL import Image
@@ -136,6 +144,7 @@ def show(
     before: Arrays,
     after: Arrays,
     *,
+    lines: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
     titles: tuple[str, str] = ("before", "after"),
     width: int = 1600,
     up: str = "y",
@@ -153,7 +162,7 @@ def show(
     OptionError
         Another argument is invalid.
     """
-    scene = _picture_scene(before, after, titles, width, up)
+    scene = _picture_scene((before, after), lines, titles, width, up)
     pyvista = require_viewer(window=True)
     _plotter(pyvista, scene, off_screen=False).show()
 
@@ -185,10 +194,16 @@ def require_viewer(*, window: bool = False) -> Any:
 
 
 def _picture_scene(
-    before: Arrays, after: Arrays, titles: tuple[str, str], width: int, up: str
+    given: tuple[Arrays, Arrays], lines: Any, titles: tuple[str, str], width: int, up: str
 ) -> PictureScene:
     """Check the arguments of a picture, and place the camera."""
-    meshes = (_as_arrays(before, "before"), _as_arrays(after, "after"))
+    meshes = (_as_arrays(given[0], "before"), _as_arrays(given[1], "after"))
+    if not isinstance(lines, tuple | list) or len(lines) != 2:
+        raise OptionError(f"lines must be two arrays of edges; got {lines!r}")
+    edges = (
+        _as_edges(lines[0], len(meshes[0][0]), "lines[0]"),
+        _as_edges(lines[1], len(meshes[1][0]), "lines[1]"),
+    )
     axes = UP[arguments.choice(up, "up", UP)]
     width = arguments.count(width, "width")
     if not isinstance(titles, tuple | list) or len(titles) != 2:
@@ -196,22 +211,24 @@ def _picture_scene(
     names = (arguments.text(titles[0], "titles[0]"), arguments.text(titles[1], "titles[1]"))
     camera = three_quarter_view(*meshes[0], axes)
     frame = _frame(np.concatenate([V[F].reshape(-1, 3) for V, F in meshes]), camera, width)
-    return PictureScene(meshes, names, camera, frame)
+    return PictureScene(meshes, edges, names, camera, frame)
 
 
 def _plotter(pyvista: Any, scene: PictureScene, *, off_screen: bool) -> Any:
     """Build the scene: two meshes, one camera for both."""
-    meshes, titles, camera, frame = scene
+    meshes, lines, titles, camera, frame = scene
     plotter = pyvista.Plotter(
         shape=(1, 2), border=False, window_size=list(frame.pixels), off_screen=off_screen
     )
     plotter.set_background(BACKGROUND)
-    for k, ((V, F), title) in enumerate(zip(meshes, titles, strict=True)):
+    for k, ((V, F), edges, title) in enumerate(zip(meshes, lines, titles, strict=True)):
         plotter.subplot(0, k)
         # Graphics cards use float32: with scaled points, neither size nor position costs digits.
         points = (V - frame.middle) / frame.half_height
         surface = pyvista.PolyData.from_regular_faces(points, F)
         _add_surface(plotter, surface, _mean_edge(points, F) * frame.pixels[1] / 2)
+        if len(edges):
+            _add_lines(plotter, pyvista, points + LIFT * camera.eye, edges)
         _add_title(plotter, f"{title}: {len(F):,} faces", frame)
         _aim(plotter, camera)
     plotter.link_views()
@@ -234,6 +251,13 @@ def _add_surface(plotter: Any, surface: Any, edge_pixels: float) -> None:
         line_width=float(np.clip(edge_pixels / 40, 1.0, 2.0)),
         edge_opacity=float(np.clip(edge_pixels / CLEAR_EDGE, FAINTEST, 1.0)),
     )
+
+
+def _add_lines(plotter: Any, pyvista: Any, points: FloatArray, edges: IntArray) -> None:
+    """Add edges in red."""
+    pairs = np.column_stack([np.full(len(edges), 2), edges])
+    curves = pyvista.PolyData(points, lines=pairs.ravel())
+    plotter.add_mesh(curves, color=KEPT, line_width=3.0, lighting=False)
 
 
 def _add_title(plotter: Any, text: str, frame: CameraFrame) -> None:
@@ -321,6 +345,14 @@ def _frame(points: FloatArray, camera: Camera, width: int) -> CameraFrame:
 
 def _mean_edge(V: FloatArray, F: IntArray) -> float:
     return float(np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2).mean())
+
+
+def _as_edges(edges: ArrayLike | None, n: int, name: str) -> IntArray:
+    """Check edges between ``n`` vertices; None for none."""
+    array = np.empty((0, 2), np.int64) if edges is None else as_array(edges, name)
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise OptionError(f"{name} must have shape (k, 2), two vertices a row; got {array.shape}")
+    return np.stack([as_indices(array[:, i], n, f"{name}[:, {i}]", "vertex") for i in (0, 1)], 1)
 
 
 def _as_arrays(mesh: Arrays, name: str) -> tuple[FloatArray, IntArray]:

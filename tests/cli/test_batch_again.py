@@ -123,8 +123,9 @@ def test_a_table_that_a_spreadsheet_saved(folder, calls, capsys):
     path.write_text(content.replace(stamp, f"{float(stamp):.5E}"))
     assert here() == 0 and "b/x.obj" in calls  # and others written in the same moment
     faces = rows["b/x.obj"]["faces_before"]
+    line = next(line for line in content.splitlines() if "b/x.obj" in line)
     for wrong in ("1,000", "Jan 98", "1.000"):
-        path.write_text(content.replace(f",{faces},", f',"{wrong}",'))
+        path.write_text(content.replace(line, line.replace(f",{faces},", f',"{wrong}",', 1)))
         capsys.readouterr()
         assert here() == 2
         error = capsys.readouterr().err

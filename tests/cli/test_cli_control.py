@@ -44,13 +44,15 @@ def test_constraints(asked):
         "face-labels": save("labels.txt", np.arange(128) % 2),
     }
     flags = [word for name, path in files.items() for word in (f"--{name}", path)]
-    flags += ["--feature-angle", "35", "--boundary", "split", "--tol", "0.1"]
+    flags += ["--feature-angle", "35", "--corner-angle", "70"]
+    flags += ["--boundary", "split", "--tol", "0.1"]
     assert main(["in.obj", *flags, "--length", "0.1"]) == 0
     call = asked[-1]
     assert call["feature_edges"].tolist() == [[0, 1], [1, 2]]
     assert call["fixed_vertices"].tolist() == [3, 40] and call["fixed_faces"].tolist() == [5]
     assert call["face_labels"].shape == (128,)
     assert (call["feature_angle"], call["boundary"], call["tol"]) == (35.0, "split", 0.1)
+    assert call["corner_angle"] == 70.0
     assert main(["in.obj", "--feature-angle", "none", "--quiet"]) == 0
     assert asked[-1]["feature_angle"] is None
 

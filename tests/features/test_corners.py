@@ -288,3 +288,54 @@ def test_surfaces_without_features_or_area():
     V, F = zoo.grid()
     corners_of(0 * V, F, 1.0)
     assert len(corners_of(V * [1, 0, 0], F, 1.0)) >= 2
+
+
+# --- zigzags ---------------------------------------------------------------------------------------
+
+
+def stairs(steps, run=1):
+    """Points of a line that goes right and up in turns, over a sheet of unit squares."""
+    points = [(2, 2)]
+    for k in range(steps):
+        x, y = points[-1]
+        points.append((x + run, y) if k % 2 == 0 else (x, y + 1))
+    return points
+
+
+@pytest.mark.parametrize("run", [1, 2])
+def test_zigzags_finer_than_the_length_have_no_corners(run):
+    """Steps of one: all of them are corners at a length of 0.5, none at 1.6 and more."""
+    points = stairs(7, run)
+    V, F, line = line_in_grid(points)
+    rim = {(0, 0), (0, 12), (12, 0), (12, 12)}
+    for length, expected in ((0.5, 6), (1.6, 0), (2.0, 0), (3.0, 0)):
+        found = set(places(V, corners_of(V, F, length, hard=line))) - rim
+        assert {points[0], points[-1]} <= found
+        assert len(found) == 2 + expected
+
+
+def test_real_corners_stay_between_zigzags():
+    """A diamond of steps keeps its four corners, or at least no others."""
+    up, down = [(1, 0), (0, 1)], [(1, 0), (0, -1)]
+    point, points = np.array([1, 6]), [(1, 6)]
+    for steps in (up * 5, down * 5, [(-x, y) for x, y in down] * 5, [(-x, y) for x, y in up] * 5):
+        for step in steps:
+            point = point + step
+            points.append(tuple(point.tolist()))
+    V, F, line = line_in_grid(points)
+    found = V[corners_of(V, F, 1.6, hard=line), :2]
+    inner = found[((found > 0) & (found < 12)).all(axis=1)]
+    tips = np.array([[1, 6], [6, 11], [11, 6], [6, 1]])
+    away = np.linalg.norm(inner[:, None] - tips, axis=2)
+    assert len(inner) == 4 and (away.min(axis=0) < 1.5).all()
+
+
+def test_wide_teeth_keep_their_corners():
+    """Crenels as wide as the length are no zigzag."""
+    points = [(1, 2)]
+    for _ in range(5):
+        x, y = points[-1]
+        points += [(x, y + 1), (x + 1, y + 1), (x + 1, y), (x + 2, y)]
+    V, F, line = line_in_grid(points)
+    found = set(places(V, corners_of(V, F, 1.0, hard=line)))
+    assert set(points[1:-1]) <= found

@@ -43,7 +43,6 @@ MENDED = {
     1000107: "needles cut one another's shorter edges",
     1000063: "a face without area at a pinched vertex",
     1000094: "a face turned over, with no options at all",
-    7001178: "a face turned over beside lengths that vary",
 }
 
 

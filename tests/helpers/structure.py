@@ -14,10 +14,12 @@ from remeshvec.core.vocabulary import (
     DEAD,
     FIXED,
     FROZEN,
+    HALTED,
     HELD,
     INNER,
     NON_MANIFOLD,
     NONE,
+    PINNED,
     Blocks,
     Mesh,
     Tree,
@@ -271,7 +273,9 @@ def assert_valid(mesh: Mesh, slits: bool = False) -> None:
         assert valence - mesh.valence_excess[v] in ideal, f"valence of {v}"
         at_curve = sum(on_curve[h] for h in leaving) + len(open_ones)
         assert at_curve == 2 or mesh.kind[v] != CURVE, f"vertex {v} ends or joins curves"
-        kinds = (CURVE, FIXED) if at_curve else (INNER, HELD, FIXED)
+        # Edges that a guard has halted are on no curve.
+        is_on_curve = open_ones or any(on_curve[h] and mesh.curve[h] != HALTED for h in leaving)
+        kinds = (CURVE, PINNED, FIXED) if is_on_curve else (INNER, HELD, FIXED)
         assert mesh.kind[v] in kinds, f"kind of {v}"
 
 

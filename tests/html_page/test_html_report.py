@@ -104,6 +104,23 @@ def test_the_views_hold_both_meshes(result):
         assert mesh["sides"] == [1]
 
 
+def test_curves_that_were_kept_are_in_the_views(result):
+    """As edges of the shown meshes: their lengths add up to those of the arrays."""
+    meshes = data_of(html_report(result))["scene"]["meshes"]
+    given = (result.report.before[0], result.input_feature_edges), (result.V, result.feature_edges)
+    ratios = []
+    for mesh, (V, edges) in zip(meshes, given, strict=True):
+        points = array(mesh["vertices"], "<f4").reshape(-1, 3)
+        shown = array(mesh["curves"], "<u4").reshape(-1, 2)
+        assert len(shown) == len(edges) > 20
+        length = [
+            np.linalg.norm(P[E[:, 0]] - P[E[:, 1]], axis=1).sum()
+            for P, E in ((points, shown), (V, edges))
+        ]
+        ratios.append(length[0] / length[1])
+    assert ratios[0] == pytest.approx(ratios[1], rel=1e-5)
+
+
 def test_colours_are_the_measures(result):
     mesh = data_of(html_report(result))["scene"]["meshes"][1]
     measured = quality(result.V, result.F, result.report.target_length)
@@ -191,6 +208,9 @@ def test_of_a_large_mesh_a_part_is_shown(result, monkeypatch):
     text = text_of(page)
     assert f"show a part of the surface, {counts[0]:,} faces before and {counts[1]:,} after" in text
     assert f"before: {len(result.report.before[1]):,} faces" in text
+    for mesh in scene["meshes"]:
+        n = len(array(mesh["vertices"], "<f4")) // 3
+        assert 0 <= array(mesh["curves"], "<u4").max(initial=0) < n
     centres = [array(mesh["vertices"], "<f4").reshape(-1, 3) for mesh in scene["meshes"]]
     assert np.linalg.norm(centres[0].mean(axis=0) - centres[1].mean(axis=0)) < 0.3
 

@@ -111,6 +111,14 @@ def test_nothing_wanted():
     assert found.fixed_faces is None and found.labels is None and found.unselected is None
 
 
+def test_corner_angles():
+    assert made().corner_angle is None
+    assert made(corner_angle=180).corner_angle == 180.0
+    for value in (0, 181, "auto", True, float("nan")):
+        with pytest.raises(OptionError, match=r"corner_angle must be .* degrees"):
+            made(corner_angle=value)
+
+
 def test_good_angles():
     for value, expected in (("auto", "auto"), (None, None), (30, 30.0), (np.float32(1.5), 1.5)):
         found = made(feature_angle=value).feature_angle

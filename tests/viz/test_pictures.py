@@ -41,6 +41,30 @@ def box(size, centre=(0, 0, 0)):
     return V * size + centre, np.array(F)
 
 
+def redness(image):
+    """Share of pixels that are red, left and right."""
+    red = (image[..., 0] > image[..., 1] + 80) & (image[..., 0] > image[..., 2] + 80)
+    half = image.shape[1] // 2
+    return red[:, :half].mean(), red[:, half:].mean()
+
+
+def test_lines_are_red(pyvista, tmp_path):
+    """On the mesh that they belong to, and in front of its faces."""
+    V, F = box((1, 1, 1))
+    rim = [[0, 1], [1, 3], [3, 2], [2, 0], [4, 5], [5, 7], [7, 6], [6, 4]]
+    both = (V, F), (V, F)
+    viz.picture(tmp_path / "a.png", *both, width=600)
+    assert redness(pixels(tmp_path / "a.png")) == (0, 0)
+    viz.picture(tmp_path / "b.png", *both, lines=(rim, None), width=600)
+    left, right = redness(pixels(tmp_path / "b.png"))
+    assert left > 0.003 and right == 0
+    viz.picture(tmp_path / "c.png", *both, lines=(None, np.array(rim)), width=600)
+    assert redness(pixels(tmp_path / "c.png")) == pytest.approx((0, left), rel=0.1)
+    for wrong in (None, (rim,), ([0, 1], None), ([[0, 8]], None)):
+        with pytest.raises(RemeshvecError, match="lines"):
+            viz.picture(tmp_path / "d.png", *both, lines=wrong)
+
+
 @pytest.mark.parametrize("suffix", viz.PICTURE_SUFFIXES)
 def test_picture_shows_both_meshes_and_nothing_is_cut(suffix, pyvista, tmp_path, capfd):
     path = tmp_path / f"a{suffix}"
@@ -168,4 +192,5 @@ def test_the_command_makes_a_picture(pyvista, tmp_path, monkeypatch, capsys):
     assert main(["in.obj", "--length", "0.3", "--picture", "a.png"]) == 0
     assert sorted(os.listdir()) == ["a.png", "in.obj"]
     assert is_drawn(pixels("a.png")).mean() > 0.2
+    assert min(redness(pixels("a.png"))) > 0.003, "creases before and after"
     assert "written: a.png" in capsys.readouterr().out
