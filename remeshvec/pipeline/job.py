@@ -20,7 +20,13 @@ from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size,
 from ..sweeps.counts import count_elements
 from ..sweeps.deviation import DeviationCheck
 from ..sweeps.finish import deviation_of, finish, has_finish
-from ..sweeps.flaws import CrossingCheck, FoldCheck, count_new_crossings, count_new_flaws
+from ..sweeps.flaws import (
+    CrossingCheck,
+    FoldCheck,
+    count_more_crossings,
+    count_new_flaws,
+    has_crossings_at_curves,
+)
 from ..sweeps.guard import Check, Guard, HoldingGuard
 from ..sweeps.loop import Stop, run_sweeps
 from ..sweeps.mending import mend_folds
@@ -175,8 +181,11 @@ class Job:
     def _without_flaws(self, mesh: Mesh, before: Mesh, featured: FeaturedReference) -> Swept:
         """Sweep over a mesh, with care where that makes flaws: most meshes are done after one look."""
         best = self._swept(mesh, before, featured, ())
-        if best.n_flaws:
-            best = self._with_care(best, before, featured)
+        if not self.monitor.is_cancelled:
+            if best.n_flaws == 0 and has_crossings_at_curves(best.work.mesh, self.parallel):
+                best = self._judged(best, before)
+            if best.n_flaws or best.n_crossings:
+                best = self._with_care(best, before, featured)
         self.monitor.counts = best.counts
         return replace(best, stop=Stop.CANCELLED) if self.monitor.is_cancelled else best
 
@@ -188,11 +197,12 @@ class Job:
         """
         folds = FoldCheck(self.parallel)
         crossings = CrossingCheck(self.parallel, self.recipe.avoid_intersections)
-        if self._may_mend(best.work):
+        has_folds = best.n_flaws > 0
+        if has_folds and self._may_mend(best.work):
             mend_folds(best.work, before, make_schedule(self.recipe)[-1])
             best = self._judged(best, before)
         guards: list[tuple[Check, ...]] = [(folds,), (folds, crossings)]
-        for checks in guards[self.recipe.avoid_intersections :]:
+        for checks in guards[self.recipe.avoid_intersections or not has_folds :]:
             if not (best.n_flaws or best.n_crossings) or self.monitor.is_cancelled:
                 break
             other = self._judged(self._swept(before.copy(), before, featured, checks), before)
@@ -204,7 +214,7 @@ class Job:
         """Count flaws, and faces that have come to cross others."""
         after = swept.work.mesh
         n_flaws = self._count_flaws(before, after)
-        n_crossings = count_new_crossings(before, after, False, self.parallel)
+        n_crossings = count_more_crossings(before, after, self.parallel)
         return replace(swept, n_flaws=n_flaws, n_crossings=n_crossings)
 
     def _may_mend(self, work: Work) -> bool:

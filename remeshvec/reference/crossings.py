@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.compiler import inlined, threaded
 from ..core.geometry import face_vector
-from ..core.vocabulary import IndexArray, Tree
+from ..core.vocabulary import BoolArray, IndexArray, Tree
 from .bvh import ARITY, LEAF, STACK, corner
 
 __all__ = ["crossing_faces"]
@@ -18,33 +18,38 @@ __all__ = ["crossing_faces"]
 _APART = 1e-13
 
 
-def crossing_faces(tree: Tree, parallel: bool, adjacent: bool = True) -> IndexArray:
+def crossing_faces(
+    tree: Tree, parallel: bool, adjacent: bool = True, among: BoolArray | None = None
+) -> IndexArray:
     """Return the faces that cross another one, in order: an edge of one passes through the other.
 
     Faces that touch, or lie in one plane, do not cross. Two faces that share a corner cross if they also
     meet elsewhere [Moeller 1997; here by signed volumes]. Without ``adjacent``, only faces without a
-    common corner are tested, which is faster.
+    common corner are tested, which is faster. With ``among``, an (m,) mask, only its faces are tested
+    against all others.
     """
     marks = np.zeros(len(tree.corners), np.uint8)
-    _find_crossings(parallel, tree, adjacent, marks)
+    is_asked = np.ones(len(marks), np.bool_) if among is None else among
+    _find_crossings(parallel, tree, adjacent, is_asked, among is None, marks)
     return np.flatnonzero(marks).astype(np.int32)
 
 
-@threaded(lambda tree, adjacent, marks: -(-marks.size // LEAF))
-def _find_crossings(span, tree, adjacent, marks):
-    """Mark the faces of the leaves in a span, and the later ones that they cross.
+@threaded(lambda *args: -(-args[-1].size // LEAF))
+def _find_crossings(span, tree, adjacent, is_asked, are_all, marks):
+    """Mark the faces asked for in the leaves of a span, and the others that they cross.
 
     Pieces may mark the same face, with the same value.
     """
     for leaf in range(span[0], span[1]):
         stack = np.empty((2, STACK), np.int64)
         for f in range(LEAF * leaf, min(LEAF * leaf + LEAF, marks.size)):
-            _mark_crossed(tree, f, adjacent, stack, marks)
+            if is_asked[f]:
+                _mark_crossed(tree, f, adjacent, is_asked, are_all, stack, marks)
 
 
 @inlined
-def _mark_crossed(tree, f, adjacent, stack, marks):
-    """Mark a face and the later ones that it crosses, if any."""
+def _mark_crossed(tree, f, adjacent, is_asked, are_all, stack, marks):
+    """Mark a face and those that it crosses, if any; of two that are asked for, at the earlier one."""
     low, high = _box_of(tree.corners, f)
     stack[0, 0] = 0
     stack[1, 0] = tree.level.size - 2
@@ -55,7 +60,7 @@ def _mark_crossed(tree, f, adjacent, stack, marks):
         d = stack[1, size]
         if d == 0:
             for g in range(LEAF * i, min(LEAF * i + LEAF, tree.corners.shape[0])):
-                if g <= f or not _meets(tree.corners, g, low, high):
+                if (g <= f and is_asked[g]) or not _meets(tree.corners, g, low, high):
                     continue
                 if _cross(tree.corners, f, g, adjacent):
                     marks[f] = 1
@@ -63,8 +68,8 @@ def _mark_crossed(tree, f, adjacent, stack, marks):
             continue
         start = tree.level[d - 1]
         end = min(start + ARITY * i + ARITY, tree.level[d])
-        # Boxes of earlier faces alone are left out.
-        first = f // (LEAF * np.int64(ARITY) ** (d - 1))
+        # Boxes of earlier faces alone are left out, if these ask for themselves.
+        first = f // (LEAF * np.int64(ARITY) ** (d - 1)) if are_all else 0
         for j in range(start + max(ARITY * i, first), end):
             if _box_meets(tree.boxes, j, low, high):
                 stack[0, size] = j - start

@@ -7,13 +7,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.vocabulary import DEAD, BoolArray, FloatArray, IndexArray, Mesh
+from ..core.vocabulary import CURVE, DEAD, BoolArray, FloatArray, IndexArray, Mesh
 from ..mesh.blocks import make_blocks
 from ..operations.folds import area_vectors, find_flat_faces, find_folds, has_folds
 from ..reference.crossings import crossing_faces
-from .guard import LazyTree, Offenders, lazy_tree
+from .guard import LazyTree, Offenders, lazy_tree, tree_of
 
-__all__ = ["CrossingCheck", "FoldCheck", "count_new_crossings", "count_new_flaws"]
+__all__ = [
+    "CrossingCheck",
+    "FoldCheck",
+    "count_more_crossings",
+    "count_new_flaws",
+    "has_crossings_at_curves",
+]
 
 # New flaws within so many target lengths of old ones are the old ones, moved; ...
 _NEAR = 1.0
@@ -103,12 +109,12 @@ class CrossingCheck:
 
     def remember_nothing(self) -> None:
         """Let all crossings count as new."""
-        self.crossings = _Places(np.empty((0, 3)), 0.0)
+        self.crossings, self.n_old = _Places(np.empty((0, 3)), 0.0), 0
 
     def remember(self, mesh: Mesh, tree: LazyTree) -> None:
         """Note where faces cross."""
         _, points, area = self._crossings(mesh, tree)
-        self.crossings = _Places(points, float(area.sum()))
+        self.crossings, self.n_old = _Places(points, float(area.sum())), len(points)
 
     def offenders(self, mesh: Mesh, tree: LazyTree) -> Offenders:
         """Corners of faces that cross others anew."""
@@ -135,15 +141,38 @@ def count_new_flaws(before: Mesh, after: Mesh, crossings: bool, parallel: bool) 
         check = FoldCheck(parallel)
         check.remember(before, lazy_tree(before, parallel))
         count += check.offenders(after, lazy_tree(after, parallel)).size
-    return count + (count_new_crossings(before, after, True, parallel) if crossings else 0)
+    return count + (_new_crossings(before, after, True, parallel)[0] if crossings else 0)
 
 
-def count_new_crossings(before: Mesh, after: Mesh, adjacent: bool, parallel: bool) -> int:
-    """Count the vertices of faces that cross others, and did not in an earlier mesh."""
+def has_crossings_at_curves(mesh: Mesh, parallel: bool) -> bool:
+    """Tell whether faces at curves cross others that they share no corner with.
+
+    Chords of curves leave the surface farthest: where walls are thin, faces cross there first. To ask
+    about all faces takes a third of a call.
+    """
+    F = mesh.origin.reshape(-1, 3)
+    F = F[F[:, 0] != DEAD]
+    at_curve = (mesh.kind >= CURVE)[F].any(axis=1)
+    if not at_curve.any():
+        return False
+    return len(crossing_faces(tree_of(mesh, parallel), parallel, False, at_curve)) > 0
+
+
+def count_more_crossings(before: Mesh, after: Mesh, parallel: bool) -> int:
+    """Count new crossings if they are more than the old ones, without those of faces with common corners.
+
+    Where a surface crosses itself as much, a guard against crossings does more harm than good.
+    """
+    new, old = _new_crossings(before, after, False, parallel)
+    return new if new > old else 0
+
+
+def _new_crossings(before: Mesh, after: Mesh, adjacent: bool, parallel: bool) -> tuple[int, int]:
+    """Count the vertices at new crossings, and the faces at old ones if there are new ones."""
     check = CrossingCheck(parallel, adjacent)
     check.remember_nothing()
     tree = lazy_tree(after, parallel)
     if not check.offenders(after, tree).size:
-        return 0
+        return 0, 0
     check.remember(before, lazy_tree(before, parallel))
-    return check.offenders(after, tree).size
+    return check.offenders(after, tree).size, check.n_old

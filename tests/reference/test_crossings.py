@@ -49,6 +49,22 @@ def test_soups_cross_as_in_the_twin(seed):
     assert len(found(V, F)) > 10
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_only_some_are_asked(seed):
+    """The ones that are asked for and cross any other, and those others."""
+    rng = np.random.default_rng(seed)
+    V = rng.random((40, 3))
+    F = np.array([rng.choice(40, 3, replace=False) for _ in range(60)])
+    is_asked = rng.random(60) < 0.2
+    tree = tree_over(V, F)
+    pairs = {(f, g) for f in range(60) for g in range(f) if len(naive(V, F[[f, g]])) == 2}
+    some = crossing_faces(tree, False, False, is_asked).tolist()
+    apart = [pair for pair in pairs if not set(F[pair[0]].tolist()) & set(F[pair[1]].tolist())]
+    expected = sorted({f for pair in apart if is_asked[list(pair)].any() for f in pair})
+    assert some == expected
+    assert 5 < len(some) < len(crossing_faces(tree, False, False))
+
+
 @pytest.mark.parametrize("name", ["icosphere", "torus", "cube", "grid", "two_cubes_on_an_edge"])
 def test_surfaces_that_only_touch_do_not_cross(name):
     V, F = getattr(zoo, name)()
