@@ -73,6 +73,11 @@ def short_edges(V, F, limit: float) -> set[frozenset[int]]:
     return {e for e in edges(F) if edge_length(V, e) < limit}
 
 
+def middle_length(s, t):
+    """Close to the logarithmic mean of two target lengths."""
+    return (0.5 * (s + t) + 2 * np.sqrt(s * t)) / 3
+
+
 def edge_length(V, edge) -> float:
     a, b = edge
     return float(np.linalg.norm(V[a] - V[b]))

@@ -70,7 +70,7 @@ def test_the_page_tells_what_the_command_prints(result):
     assert "a part" in text and "call remeshvec part.obj --length 0.3" in text
     assert f"remeshvec {remeshvec.__version__}" in text
     assert f"sweeps ended {result.report.stop}" in text
-    assert "untangle angle 41.5" in text and "flip passes 2" in text
+    assert "untangle angle 43.8" in text and "flip passes 2" in text
     assert f"total {result.report.seconds['total']:.4f}" in text
     first = result.report.sweeps[0]
     assert "1 " + " ".join(f"{count:,}" for count in first.values()) in text

@@ -264,6 +264,6 @@ def test_a_move_owns_the_closed_ring_of_its_vertex():
         blocks = all_but_the_last_vertex(mesh)
         candidates = one_candidate(blocks.vertex, new[centre])
         moved = np.zeros(len(W), np.uint8)
-        search = untangle.Search(False, np.cos(0.8), 0.0)
+        search = untangle.Search(False, np.cos(0.8))
         untangle._untangle(False, mesh, blocks, OWNED, tree_of(mesh), search, candidates, moved)
         assert candidates.items[0] == new[centre] and not moved.any()

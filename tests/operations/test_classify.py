@@ -33,11 +33,6 @@ def freeze_some(mesh, seed=0):
                 mesh.curve[mesh.twin[h]] = flag
 
 
-def middle_length(s, t):
-    """Close to the logarithmic mean."""
-    return (0.5 * (s + t) + 2 * np.sqrt(s * t)) / 3
-
-
 def naive_flags(mesh, f, longest, shortest):
     """Bits of one face, from lengths in plain numbers."""
     V, lengths, corners = mesh.X[:, :3], mesh.X[:, 3], mesh.origin[3 * f : 3 * f + 3]
@@ -46,11 +41,14 @@ def naive_flags(mesh, f, longest, shortest):
         a, b = corners[i], corners[(i + 1) % 3]
         length, s, t = naive.edge_length(V, (a, b)), lengths[a], lengths[b]
         bits |= 8 * (length < shortest * 2 / (1 / s + 1 / t)) << i
-        if length > longest * middle_length(s, t) and mesh.curve[3 * f + i] not in (FROZEN, HALTED):
+        if length > longest * naive.middle_length(s, t) and mesh.curve[3 * f + i] not in (
+            FROZEN,
+            HALTED,
+        ):
             long[i] = length
     if len(long) > 1:
         height = np.linalg.norm(naive.normal(V, corners)) / max(long.values())
-        around = [middle_length(*lengths[[corners[i], corners[i - 1]]]) for i in range(3)]
+        around = [naive.middle_length(*lengths[[corners[i], corners[i - 1]]]) for i in range(3)]
         if height < 0.5 * longest * np.mean(around):
             long = {max(long, key=long.get)}
     return bits | sum(1 << i for i in long)

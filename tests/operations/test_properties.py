@@ -211,7 +211,7 @@ class Phases:
         if self.o["project"]:
             self.run("project", lambda m, p: project(m, self.reference, self.blocks, p))
         self.run("unfold", lambda m, p: void(undo_folds(m, self.blocks, self.before, p)))
-        self.run("lengths", lambda m, p: read_lengths(m, self.blocks, self.reference, p))
+        self.run("lengths", lambda m, p: void(read_lengths(m, self.blocks, self.reference, p)))
 
     def pack(self):
         """Close the holes, and leave room or none."""

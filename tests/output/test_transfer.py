@@ -318,7 +318,7 @@ def test_there_and_back_again():
     V, F = zoo.upsampled(*zoo.torus())
     result = remesh(V, F, 0.5 * edges_mean(V, F))
     smooth = np.sin(V[:, 0]) + V[:, 2] ** 2
-    assert abs(result.transfer_back(result.transfer(smooth)) - smooth).max() < 0.02
+    assert abs(result.transfer_back(result.transfer(smooth)) - smooth).max() < 0.025
 
 
 def test_copies_and_pickles_know_all_of_it():

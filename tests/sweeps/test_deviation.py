@@ -11,7 +11,7 @@ from helpers.structure import built, featured
 from data.shapes.solids import plate, uv_sphere
 from remeshvec import remesh, surface_distance
 from remeshvec.sweeps.deviation import DeviationCheck, measure_deviation
-from remeshvec.sweeps.guard import tree_of
+from remeshvec.sweeps.guard import lazy_tree
 
 # Shape, and two deviations as shares of the diagonal.  Real meshes have details finer than 0.005.
 SHAPES = {
@@ -109,7 +109,7 @@ def test_the_largest_deviation_is_that_of_all_samples(amount):
     coarse = built(*zoo.perturb(*zoo.torus(20, 10), amount), ordered=True, length=0.6)
     coarse.birth[:] = coarse.source[:] = 0  # a face of the reference to start at
     _, to_input, from_input = DeviationCheck(other, 0.1, False).distances(
-        coarse, tree_of(coarse, False), 0.0
+        coarse, lazy_tree(coarse, False), 0.0
     )
     found = measure_deviation(coarse, other, False)
     assert found["to_input"] == pytest.approx(to_input.max(), rel=1e-12)

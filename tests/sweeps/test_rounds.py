@@ -44,12 +44,19 @@ def test_cells_follow_lengths_that_vary():
     assert np.abs(share - share.mean()).mean() < 0.068 * share.mean()
 
 
+def signed_area(V, F):
+    """Area of a flat mesh; faces that lie upside down count as negative."""
+    a, b, c = (V[F[:, k], :2] for k in range(3))
+    return 0.5 * np.linalg.det(np.stack([b - a, c - a], axis=1)).sum()
+
+
 @pytest.mark.parametrize("name", ["annulus", "planar_delaunay"])
 def test_rounds_keep_boundaries_flat_meshes_and_corners(name):
     V, F = zoo.upsampled(*zoo.ZOO[name].make(), noise=0.3)
     result = remesh(V, F, 0.7 * zoo.mean_edge(V, F))
     assert np.abs(result.V[:, 2]).max() < 1e-12
-    assert zoo.area(result.V, result.F) == pytest.approx(zoo.area(V, F), rel=0.05)
+    # Signed: the input has folds that lie flat, and lose them.
+    assert signed_area(result.V, result.F) == pytest.approx(signed_area(V, F), rel=0.01)
     if name == "annulus":  # the other has a jagged boundary
         assert quality(*result).min_angle > 42.0
 
