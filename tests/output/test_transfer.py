@@ -203,7 +203,7 @@ def test_held_faces_keep_the_data_of_their_corners():
     assert np.array_equal(result.face_birth[now], held)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 7, 10])
+@pytest.mark.parametrize("seed", [0, 1, 3, 7])
 def test_rough_surfaces_keep_their_sides(seed):
     V, F, uv = textured.torus()
     V = V + np.random.default_rng(seed).normal(size=V.shape) * 0.105
