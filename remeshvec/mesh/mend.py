@@ -176,10 +176,10 @@ def _weld_short_edges(
         rows = drop_degenerate_faces(welded)
         if rows is None:
             return now
-        # A part that would vanish as a whole stays, however small, if it has a shape.
-        lost = np.setdiff1d(target[_shaped(V, now.F, rows)], welded[rows])
+        lost = _lost_corners(V, now.F, rows, target, kept)
         if not len(lost):
             break
+        # Each of these faces repeats a corner, so that at least one vertex more is put back.
         back = np.isin(target, lost)
         target[back] = np.flatnonzero(back)
     counts = dict(now.counts)
@@ -188,6 +188,23 @@ def _weld_short_edges(
     now = now._replace(F=welded, representative=target[now.representative], counts=counts)
     now = _keep(now, rows, "collapsed_faces")
     return _keep(now, drop_duplicate_faces(now.F), "duplicate_faces")
+
+
+def _lost_corners(
+    V: FloatArray, F: IndexArray, rows: np.ndarray, target: IndexArray, kept: Kept
+) -> IndexArray:
+    """Return what the corners became of faces that must not go with those outside these rows.
+
+    A part that would vanish as a whole stays, however small, if it has a shape; so does a vertex that
+    is kept. The tip of a spike may go: what its base became is still there.
+    """
+    shaped = _shaped(V, F, rows)
+    welded = target[shaped]
+    is_there = np.zeros(len(target), np.bool_)
+    is_there[target[F[rows]]] = True
+    remains = is_there[welded]
+    loses_kept = (kept.vertices[shaped] & ~remains).any(axis=1)
+    return welded[~remains.any(axis=1) | loses_kept].ravel()
 
 
 def _shaped(V: FloatArray, F: IndexArray, rows: np.ndarray) -> IndexArray:

@@ -114,6 +114,35 @@ def test_small_parts_stay():
     assert len(result.mesh.origin) // 3 == len(F) + len(G)
 
 
+def spiked_ball(height):
+    """A ball and a vertex of it that stands on a ring which has shrunk to a thread."""
+    V, F = zoo.icosphere(2)
+    tip = 0
+    ring = np.setdiff1d(F[(tip == F).any(axis=1)], tip)
+    foot = V[tip].copy()
+    V[ring] = foot + 1e-9 * (V[ring] - foot)
+    V[tip] *= 1 + height
+    return V, F, tip, ring
+
+
+@pytest.mark.parametrize("height", [1e-5, 0.1])
+def test_a_spike_without_thickness_goes(height):
+    V, F, _, ring = spiked_ball(height)
+    result = mended(V, F)
+    G = result.mesh.origin.reshape(-1, 3)
+    assert len(np.unique(result.representative[ring])) == 1
+    assert len(result.mesh.X) == len(V) - len(ring)  # its tip is gone, its foot is one vertex
+    assert not naive.boundary_edges(G) and euler(G) == 2
+
+
+def test_a_spike_whose_tip_is_kept_stays():
+    V, F, tip, _ = spiked_ball(0.1)
+    kept = Kept(np.arange(len(V)) == tip, np.zeros(len(F), bool))
+    result = mended(V, F, find_kept=lambda: kept)
+    assert len(result.mesh.origin) // 3 == len(F)
+    assert "short_edges" not in result.dirt
+
+
 def test_what_must_stay_does():
     V, F = with_caps((0.5,))
     n, m = len(V), len(F)
