@@ -25,7 +25,7 @@ PRESETS = {
     "fast": "five sweeps of the published algorithm",
     "default": "eight sweeps, twenty rounds",
     "fine": "sixteen sweeps, twenty rounds, and the fit: vertices beside the input",
-    "even": "eight sweeps, five hundred rounds",
+    "even": "eight sweeps, rounds until the areas settle, at most five hundred",
 }
 TIME = "time"
 SHOWN = tuple(column for column in COLUMNS if column.key not in ("in_band", "faces"))

@@ -26,11 +26,12 @@ class Rounds(NamedTuple):
     momentum near 1 shakes the mesh: defects of the valences meet and vanish, as in annealing.
     """
 
-    number: int
+    number: int  # at most
     gain: float = 3.0  # share of the way to the centroid that is added to the velocity
     momentum: float = 0.85  # share of the velocity that stays
     trade_angle: float = 25.0  # degrees by which opposite angles must outweigh a step of valence
     stiffness: float = 600.0  # hold of curved ridges on their vertices
+    patience: int = 0  # rounds to go on without more even areas; 0: all rounds are run
 
 
 @dataclass(frozen=True)
@@ -97,8 +98,8 @@ PRESETS: dict[str, Recipe] = {
         _DEFAULT,
         preset="even",
         rounds=(
-            Rounds(460, gain=1.0, momentum=0.998, trade_angle=10.0, stiffness=1200.0),
-            Rounds(40, trade_angle=10.0),
+            Rounds(460, gain=0.5, momentum=0.998, trade_angle=10.0, stiffness=1200.0, patience=80),
+            Rounds(40, trade_angle=10.0, patience=10),
         ),
         untangle_rounds=8,
         untangle_angle=44.1,

@@ -126,9 +126,9 @@ def remesh(
         edges stay.
     preset : {"default", "even", "fast", "fine"}
         ``"default"``: eight sweeps with loosening thresholds, then twenty rounds that move vertices to
-        the centroids of their cells; vertices on the input. ``"even"``: five hundred rounds, for areas
-        as even as can be. ``"fast"``: the published algorithm, five sweeps. ``"fine"``: sixteen sweeps,
-        twenty rounds, and the fit.
+        the centroids of their cells; vertices on the input. ``"even"``: up to five hundred rounds,
+        until the areas settle, as even as can be. ``"fast"``: the published algorithm, five sweeps.
+        ``"fine"``: sixteen sweeps, twenty rounds, and the fit.
     iterations : int, optional
         Sweeps at most; threshold schedules are stretched over them.
     split, collapse : float or sequence of float, optional

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, radians, tan
+from math import cos, inf, radians, tan
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..operations.frames import FRAME_SIZE, measure_frames
 from ..operations.lloyd import Pace, run_lloyd_round, turn_velocities
 from ..operations.project import project_vertices
 from ..operations.slide import slide_vertices
+from ..operations.spread import area_spread
 from ..operations.unfold import undo_folded_edges
 from ..reference.bvh import WALK_TRUST
 from .guard import Guard
@@ -31,6 +32,28 @@ _PROJECT_EVERY = 10
 # and .08 it changes nothing.
 _REACH = 0.05
 
+# Areas are more even where their spread has fallen by this share. Between two looks it also rises, by up
+# to .4 percent.
+_PROGRESS = 0.01
+
+
+class Settling:
+    """When to stop: once the areas have not become more even for some rounds.
+
+    Every look at the mesh asks whether the spread of the areas lies a share below a mark, which then
+    moves there. As long as the spread falls, however unsteadily, the rounds go on.
+    """
+
+    def __init__(self, patience: int) -> None:
+        self.patience = patience  # rounds; 0: for ever
+        self._mark, self._since = inf, 0
+
+    def has_settled(self, rounds: int, spread: float) -> bool:
+        """Look at the spread after so many rounds."""
+        if spread < (1.0 - _PROGRESS) * self._mark:
+            self._mark, self._since = spread, rounds
+        return 0 < self.patience <= rounds - self._since
+
 
 def even_out(work: Work, guard: Guard) -> None:
     """Run the Lloyd rounds of the recipe on a compact mesh; a guard may try them as it tries a sweep."""
@@ -43,13 +66,17 @@ def even_out(work: Work, guard: Guard) -> None:
 
 
 def run_rounds(work: Work, rounds: Rounds) -> None:
-    """Move vertices towards the centroids of their cells; flip and project from time to time."""
+    """Move vertices towards the centroids of their cells; flip and project from time to time.
+
+    With patience, they end where the areas have settled, which is looked for at every projection.
+    """
     mesh, blocks, parallel = work.mesh, work.blocks, work.is_parallel
     pace = Pace(rounds.gain, rounds.momentum, _REACH)
     velocity = np.zeros((len(mesh.X), 3))
     frames = np.empty((len(mesh.X), FRAME_SIZE))
+    settling = Settling(rounds.patience)
     for first in range(0, rounds.number, _PROJECT_EVERY):
-        if work.monitor.is_cancelled:
+        if work.monitor.is_cancelled or _has_settled(work, settling, first):
             return
         start = mesh.X.copy()
         measure_frames(mesh, blocks, rounds.stiffness, frames, parallel)
@@ -62,6 +89,12 @@ def run_rounds(work: Work, rounds: Rounds) -> None:
         _project(work)
         _unfold(work, start, velocity)
         work.monitor.report("even out")
+
+
+def _has_settled(work: Work, settling: Settling, rounds: int) -> bool:
+    if not settling.patience:
+        return False
+    return settling.has_settled(rounds, area_spread(work.mesh, work.blocks, work.is_parallel))
 
 
 def _flip(work: Work, rounds: Rounds) -> None:

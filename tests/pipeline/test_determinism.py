@@ -38,6 +38,7 @@ from remeshvec.operations.project import project_curves, read_lengths
 from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
+from remeshvec.operations.spread import area_spread
 from remeshvec.operations.unfold import undo_folded_edges, undo_folds
 from remeshvec.operations.untangle import untangle_vertices
 from remeshvec.output import extract
@@ -79,6 +80,7 @@ def phases():
         yield "relax", lambda m, b, r, p, s=stiffness: relax_vertices(m, b, s, p)
     for varies in (False, True):
         yield "lloyd", lambda m, b, r, p, v=varies: lloyd_rounds(m, b, v, p)
+    yield "spread", lambda m, b, r, p: np.array(area_spread(m, b, p))
     yield "unfold", lambda m, b, r, p: unfold(m, b, p)
     yield "unfold edges", lambda m, b, r, p: unfold(m, b, p, undo_folded_edges)
     yield "project", lambda m, b, r, p: project(shifted(m), r, b, p)

@@ -1,11 +1,14 @@
 """Rounds after the sweeps: areas become even, angles stay good, and nothing else changes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers import zoo
 
 from remeshvec import quality, remesh
 from remeshvec.core.vocabulary import HELD
+from remeshvec.input.recipe import PRESETS
 from remeshvec.sweeps import rounds
 
 
@@ -84,6 +87,42 @@ def test_a_bound_holds_through_the_rounds():
     V, F = zoo.torus(48, 24)
     result = remesh(V, F, 0.25, max_deviation=0.01)
     assert max(result.report.deviation.values()) <= 0.01
+
+
+def test_settling_waits_for_progress():
+    """A fall of 1 % moves the mark; what rises, or falls by less, does not."""
+    spreads = [1.0, 0.98, 0.985, 0.975, 0.96, 0.955, 0.99, 0.952, 0.951]
+    settling = rounds.Settling(30)
+    answers = [settling.has_settled(10 * k, spread) for k, spread in enumerate(spreads)]
+    assert answers == [False] * 7 + [True] * 2
+
+
+def test_a_slow_fall_is_progress():
+    """Each look brings too little, several together enough."""
+    settling = rounds.Settling(30)
+    assert not any(settling.has_settled(10 * k, 0.995**k) for k in range(50))
+
+
+@pytest.mark.parametrize("patience", [0, 20])
+def test_without_patience_all_rounds_are_run(patience, monkeypatch):
+    monkeypatch.setattr(rounds, "area_spread", lambda *_: 0.0)
+    even = PRESETS["even"]
+    stages = tuple(stage._replace(number=50, patience=patience) for stage in even.rounds)
+    monkeypatch.setitem(PRESETS, "even", replace(even, rounds=stages))
+    assert looks(*wavy(), 0.4) == (4 if patience else 10)
+
+
+def looks(V, F, L):
+    """Projections while areas are evened out; one every tenth round."""
+    phases = []
+    remesh(V, F, L, preset="even", callback=lambda _, phase, __: phases.append(phase))
+    return phases.count("even out")
+
+
+def test_rounds_end_where_areas_settle():
+    """Small meshes have few defects to lose."""
+    V, F = wavy()
+    assert 10 <= looks(V, F, 0.9 * zoo.mean_edge(V, F)) < 50
 
 
 def test_fast_has_no_rounds():
