@@ -24,6 +24,7 @@ PAIRS = (
     (who.PYMESHLAB_LEAN, who.DEFAULT),
     (who.MMG, who.DEFAULT),
     (who.ACVD, who.DEFAULT),
+    (who.FIELD, who.DEFAULT),
 )
 OURS = (who.FAST, who.DEFAULT, who.FINE)
 BEST_IS_LOW = {"area_error_voronoi", "area_error_face", "hausdorff", "rms"}

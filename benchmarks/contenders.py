@@ -117,7 +117,7 @@ FINE = "remeshvec fine"
 TRUEFORM, TRUEFORM_ALL = "trueform", "trueform, all cores"
 PMP, PMP_PROJECTED = "PMP, no projection", "PMP"
 MESHLIB, MESHLIB_ALL, MESHLIB_EVEN = "MeshLib", "MeshLib, all cores", "MeshLib, relaxed"
-CGAL, MMG, ACVD = "compas_cgal", "mmgpy", "pyacvd"
+CGAL, MMG, ACVD, FIELD = "compas_cgal", "mmgpy", "pyacvd", "pyinstantmeshes"
 GPYTOOLBOX, PYMESHLAB, PYMESHLAB_LEAN = "gpytoolbox", "PyMeshLab", "PyMeshLab, lean"
 
 CONTENDERS = {
@@ -230,6 +230,14 @@ CONTENDERS = {
             peers.pyacvd,
             "`Clustering.cluster` into as many clusters as equilateral faces with edges L have "
             "vertices, after `subdivide` until the mesh has ten vertices per cluster",
+            "yes",
+        ),
+        Contender(
+            FIELD,
+            "pyinstantmeshes",
+            peers.pyinstantmeshes,
+            "`remesh(target_edge_length=L, rosy=6, posy=3, deterministic=True)`: Instant Meshes, "
+            "triangles aligned with a field of directions; boundaries are not aligned by default",
             "yes",
         ),
     )

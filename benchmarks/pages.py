@@ -41,6 +41,7 @@ RATIOS = (
     ("PyMeshLab, lean / default", who.PYMESHLAB_LEAN, who.DEFAULT),
     ("mmgpy / default", who.MMG, who.DEFAULT),
     ("pyacvd / default", who.ACVD, who.DEFAULT),
+    ("pyinstantmeshes / default", who.FIELD, who.DEFAULT),
 )
 INTRO = (
     "L = 0.9 x the mean edge length of the input unless stated otherwise, the same for all. "

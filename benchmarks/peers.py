@@ -108,6 +108,21 @@ def pyacvd(V: FloatArray, F: IntArray, length: float) -> Arrays:
     return np.asarray(result.points, float), result.regular_faces
 
 
+def pyinstantmeshes(V: FloatArray, F: IntArray, length: float) -> Arrays:
+    """Triangles along a field of directions; it takes no number of iterations."""
+    import pyinstantmeshes
+
+    points, faces = pyinstantmeshes.remesh(
+        V.astype(np.float32),
+        F.astype(np.int32),
+        target_edge_length=length,
+        rosy=6,
+        posy=3,
+        deterministic=True,
+    )
+    return points.astype(float), faces
+
+
 class InFile(NamedTuple):
     """A result in a file, and the seconds that it took as the executable says."""
 

@@ -13,8 +13,11 @@ from typing import Any, NamedTuple
 
 from remeshvec import RemeshResult, quality, remesh
 
+from . import contenders as who
+from .contenders import CONTENDERS
 from .measures import COLUMNS, LEGEND, cells, measure, topology_changes, turned_faces
 from .meshes import Sample, load, small_meshes
+from .race import Effort, Entrant, Row, race
 from .tables import DOCS, machine, machine_line, page, table, write_page
 
 RECIPES: dict[str, dict[str, Any]] = {
@@ -49,6 +52,11 @@ TARGETS: dict[str, dict[str, tuple[float, bool]]] = {
 TARGETS["wolf_head"] = {"area_error_face": (13.4, AT_MOST), "hausdorff": (9.0, AT_MOST)}
 
 
+# Shown beside ours, where installed: triangles along a field have the fewest irregular vertices. Other
+# libraries are on the page that compares.
+BESIDE = (who.FIELD,)
+
+
 class Entry(NamedTuple):
     """One recipe on one mesh."""
 
@@ -62,11 +70,12 @@ class Entry(NamedTuple):
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure and write ``quality.md``."""
     arguments = _parse(argv)
-    entries = []
+    entries, beside = [], {}
     for name in arguments.meshes or small_meshes():
         print(name, file=sys.stderr, flush=True)
         entries += [entry(load(name), recipe) for recipe in RECIPES]
-    text = as_page(entries)
+        beside[name] = others(load(name))
+    text = as_page(entries, beside)
     print(text)
     write_page(arguments.output, "quality.md", text)
     return 0
@@ -84,6 +93,13 @@ def entry(sample: Sample, recipe: str) -> Entry:
     )
 
 
+def others(sample: Sample) -> dict[str, Row]:
+    """Measure results of other libraries, each in a process of its own: some crash."""
+    installed = [name for name in BESIDE if CONTENDERS[name].is_installed]
+    rows = race([Entrant(CONTENDERS[name], sample) for name in installed], Effort(repeat=0))
+    return dict(zip(installed, rows, strict=True))
+
+
 def _topology(sample: Sample, result: RemeshResult) -> str:
     before, after = quality(sample.V, sample.F), quality(result.V, result.F)
     changes = ", ".join(topology_changes(before, after)) or "kept"
@@ -91,8 +107,8 @@ def _topology(sample: Sample, result: RemeshResult) -> str:
     return f"{changes} (input: {dirt.replace('_', ' ')})" if dirt else changes
 
 
-def as_page(entries: list[Entry]) -> str:
-    """Lay out targets and figures."""
+def as_page(entries: list[Entry], beside: dict[str, dict[str, Row]]) -> str:
+    """Lay out targets and figures, and other libraries by mesh."""
     aimed = [e for e in entries if e.recipe == "default" and e.mesh in TARGETS]
     missed = sum(cell.endswith(")") for e in aimed for cell in _beside_targets(e))
     titles = [column.title for column in COLUMNS]
@@ -111,6 +127,36 @@ def as_page(entries: list[Entry]) -> str:
             [[e.mesh, e.recipe, e.topology, *cells(e.measures), str(e.turned)] for e in entries],
             text_columns=3,
         ),
+        _beside_part(entries, beside),
+    )
+
+
+def _beside_part(entries: list[Entry], beside: dict[str, dict[str, Row]]) -> str:
+    """Lay out what other libraries make of the meshes, under our most even preset."""
+    ours = {entry.mesh: entry.measures for entry in entries if entry.recipe == "even"}
+    rows, failed = [], []
+    for mesh, found in beside.items():
+        measured = {name: row["quality"] for name, row in found.items() if "quality" in row}
+        failed += [
+            f"{name} on {mesh}: {row['failed']}" for name, row in found.items() if "failed" in row
+        ]
+        if measured:
+            both = {"remeshvec even": ours[mesh], **measured}
+            rows += [[mesh, name, *cells(figures)] for name, figures in both.items()]
+    if not rows:
+        return ""
+    versions = [
+        f"{n} {CONTENDERS[n].version}: {CONTENDERS[n].settings}."
+        for n in BESIDE
+        if CONTENDERS[n].is_installed
+    ]
+    return "\n\n".join(
+        (
+            "## Beside triangles along a field",
+            " ".join(versions),
+            table(["mesh", "", *(column.title for column in COLUMNS)], rows, text_columns=2),
+            *(f"No result: {'; '.join(failed)}." for _ in failed[:1]),
+        )
     )
 
 

@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks import contenders as who
 from benchmarks import pages, parts, race, results, targets
+from benchmarks import quality as quality_page
 from benchmarks.contenders import CONTENDERS, Contender
 from benchmarks.generate import cut_finer
 from benchmarks.meshes import Sample, load, made
@@ -140,3 +141,18 @@ def test_every_part_has_meshes_and_contenders():
                 assert case.meshes and case.contenders, name
     assert set(parts.PARTS) == {*parts.RACES, *parts.OTHERS}
     assert CONTENDERS[who.DEFAULT].is_installed
+
+
+def test_triangles_along_a_field_are_measured_where_installed():
+    """A process that crashes gives a reason; the page lists it below the others."""
+    figures = {column.key: 1.0 for column in pages.COLUMNS}
+    ours = [quality_page.Entry(mesh, "even", figures, "kept", 0) for mesh in ("ball", "torus")]
+    beside = {"ball": {who.FIELD: {"failed": "it crashed"}}, "torus": {}}
+    assert "along a field" not in quality_page.as_page(ours, beside)
+    if not CONTENDERS[who.FIELD].is_installed:
+        pytest.skip("pyinstantmeshes is not installed")
+    found = quality_page.others(Sample("torus", *zoo.torus(48, 24), 0.2))
+    assert found[who.FIELD]["quality"]["valence6"] > 60.0
+    text = quality_page.as_page(ours, {**beside, "torus": found})
+    assert f"{who.FIELD} on ball: it crashed" in text
+    assert f"| torus | {who.FIELD} |" in text

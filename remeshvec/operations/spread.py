@@ -33,7 +33,7 @@ def area_spread(mesh: Mesh, blocks: Blocks, parallel: bool) -> float:
         taken per block, then over the blocks in their order.
     """
     sums = np.zeros((len(blocks.face) - 1, 3))
-    _sum_areas(parallel, mesh, blocks, sums)
+    _sum_powers(parallel, mesh, blocks, sums)
     number = first = second = 0.0
     for row in sums.tolist():
         number += row[0]
@@ -45,7 +45,7 @@ def area_spread(mesh: Mesh, blocks: Blocks, parallel: bool) -> float:
 
 
 @threaded(per_block)
-def _sum_areas(span, mesh, blocks, sums):
+def _sum_powers(span, mesh, blocks, sums):
     """Sum number, areas and squared areas of the faces of a block."""
     X = mesh.X
     for k in range(span[0], span[1]):
