@@ -35,13 +35,13 @@ def draw_plot(path: Path, plot: Any, largest: int) -> None:
 def tol(axes: Any) -> None:
     """Edges that every sweep changes, and where ``tol`` ends the call."""
     V, F = load_arrays("creature")
-    for choice, colour, width in ((None, OURS, 4.5), (0.05, LOUD, 1.8)):
+    for choice, colour, width in ((None, OURS, 4.5), (0.1, LOUD, 1.8)):
         result = remesh(V, F, 0.06, tol=choice)
         n_edges = 1.5 * len(result.F)
         shares = [sum(sweep.values()) / n_edges for sweep in result.report.sweeps]
         label = f"tol={choice}: {len(shares)} sweeps"
         axes.semilogy(range(1, len(shares) + 1), shares, "o-", color=colour, lw=width, label=label)
-    axes.axhline(0.05, color="#555555", lw=1, ls="--")
+    axes.axhline(0.1, color="#555555", lw=1, ls="--")
     axes.set(xlabel="sweep", ylabel="edges changed / edges")
     axes.legend()
 
