@@ -2,7 +2,7 @@
 
 The edges of its steps are as clean as those of a part, but they come in turn: where the surface bends
 one way it soon bends back, and then the same way again. So a ledge or a groove, which bends back once,
-is none of them.
+is none of them, nor is the round shoulder of a part: the steps of voxels have few directions.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from .candidates import CLEAN, PIECE, TERRACE, Candidates, Ground, per_piece
 from .dihedral import face_cosine
 from .echo import echo_cosines
 from .links import Segments, networks
+from .rounded import find_rounded
 from .walks import PARALLEL, cross_face, edge_vector, is_convex
 
 __all__ = ["drop_terraces"]
@@ -67,11 +68,13 @@ def drop_terraces(
     is_step, back = np.empty(len(asked), np.bool_), np.empty(len(asked))
     edges, turn = candidates.edges[asked], candidates.turn[asked]
     _walk_down(parallel, edges, ground, turn, mean_edge, is_step, back)
+    is_rounded = find_rounded(segments, asked)
+    is_step &= ~is_rounded
     length = segments.length[asked, 0]
     is_short = segments.length[asked, 1] <= EDGE
     if (length * (is_step & is_short)).sum() < MASK_SHARE * segments.length[is_clean, 0].sum():
         return
-    is_step |= back <= MASK_GAP
+    is_step |= (back <= MASK_GAP) & ~is_rounded
     network = networks(segments, asked)
     of_steps = np.bincount(network, length * is_step)[network]
     total = np.bincount(network, length)[network]

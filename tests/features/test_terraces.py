@@ -95,6 +95,24 @@ def test_the_steps_of_a_part_stay():
     assert len(edges) == 14 and len(dropped["terrace"]) == 0
 
 
+@pytest.mark.parametrize("segments", [24, 64])
+def test_the_round_steps_of_a_part_stay(segments):
+    """A turned shaft of many shoulders; its edges are as short as those of voxels."""
+    steps = np.arange(13)
+    radius = 5 - 0.3 * np.repeat(steps, 2)[:-1]
+    height = 0.3 * np.repeat(steps, 2)[1:]
+    angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)
+    rings = [np.c_[r * np.cos(angle), r * np.sin(angle), 0 * angle + z]
+             for r, z in zip(radius, height, strict=True)]  # fmt: skip
+    V = np.concatenate(rings)
+    i = np.arange(len(V) - segments)
+    j = np.where(i % segments == segments - 1, i - segments + 1, i + 1)
+    F = np.concatenate([np.c_[i, j, j + segments], np.c_[i, j + segments, i + segments]])
+    edges, dropped = find_creases(V, F, 2.0, return_dropped=True)
+    assert len(dropped["terrace"]) == 0
+    assert len(edges) == segments * (len(rings) - 2)
+
+
 def test_what_became_of_every_edge_is_known():
     """An edge that turns far enough is a crease or was dropped for one reason."""
     V, F = voxels.level_surface(voxels.ball_and_block())
