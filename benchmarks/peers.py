@@ -93,6 +93,15 @@ def mmgpy(V: FloatArray, F: IntArray, length: float) -> Arrays:
     return mesh.get_vertices(), mesh.get_triangles()
 
 
+def mmgpy_adaptive(V: FloatArray, F: IntArray, bound: float) -> Arrays:
+    """MMG's surface remesher with sizes from a bound for the distance."""
+    import mmgpy
+
+    mesh = mmgpy.MmgMeshS(V, F.astype(np.int32))
+    mesh.remesh(hausd=bound, hgrad=1.5, angle=0, verbose=-1)
+    return mesh.get_vertices(), mesh.get_triangles()
+
+
 def pyacvd(V: FloatArray, F: IntArray, length: float) -> Arrays:
     """Clusters of vertices, triangulated; it takes a number of clusters instead of a length."""
     import pyacvd

@@ -11,8 +11,8 @@ from remeshvec import quality
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks import adaptive, pages, parts, peers, race, results, targets
 from benchmarks import contenders as who
-from benchmarks import pages, parts, race, results, targets
 from benchmarks import quality as quality_page
 from benchmarks.contenders import CONTENDERS, Contender
 from benchmarks.generate import cut_finer
@@ -156,3 +156,27 @@ def test_triangles_along_a_field_are_measured_where_installed():
     text = quality_page.as_page(ours, {**beside, "torus": found})
     assert f"{who.FIELD} on ball: it crashed" in text
     assert f"| torus | {who.FIELD} |" in text
+
+
+def test_mmg_is_asked_for_what_is_as_far_from_the_input(monkeypatch):
+    """Here by spheres whose chords sag by the bound."""
+
+    def sphere(V, F, bound):
+        n = int(np.clip(np.log2(1.2 / np.sqrt(8 * bound)) + 1, 1, 6))
+        return zoo.icosphere(n)
+
+    monkeypatch.setattr(peers, "mmgpy_adaptive", sphere)
+    V, F = zoo.icosphere(6)
+    sample = Sample("sphere", V, F, 0.1)
+    near, far = (adaptive.as_far(sample, h, 12**0.5) for h in (0.1, 1.0))
+    assert near.hausdorff <= 0.1 and far.hausdorff <= 1.0
+    assert near.faces > far.faces > 80
+
+
+def test_adaptive_lengths_stand_beside_the_same_as_an_array(monkeypatch):
+    monkeypatch.setattr(adaptive, "find_spec", lambda name: None)
+    V, F = zoo.torus(48, 24)
+    rows = adaptive.rows_of(Sample("torus", V, F, 0.1), 0.005)
+    assert [row[:2] for row in rows] == [["torus", "Adaptive"], ["torus", "array"]]
+    assert all(len(row) == len(adaptive.HEAD) and float(row[3]) > 35 for row in rows)
+    assert rows[1][-1] == "1.0"
