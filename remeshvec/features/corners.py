@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.compiler import inlined, kernel
-from ..core.geometry import distance_squared
+from ..core.geometry import distance_squared, point
 from ..core.vocabulary import NONE, BoolArray, FloatArray, IndexArray
 from ..mesh.walk import next_halfedge
 from .curves import Curves
@@ -48,20 +48,31 @@ class _Scale(NamedTuple):
     of_loop: float
     of_open: float
     from_end: float  # how far from the ends of a curve, in target lengths, its corners begin
+    local_share: float
+    window: float  # half of the way over which the curve is smoothed before, in target lengths
 
 
-_FINE = _Scale(0.5, SHORT_SHARE, SHORT_SHARE, 0.0)
-_FAR = _Scale(1.5, 3.0 * SHORT_SHARE, 0.5, 0.0)  # where corners are told from zigzags
-_COARSE = _Scale(2.0, SHORT_SHARE, 2.0 * SHORT_SHARE, 1.0)  # along zigzags
+_FINE = _Scale(0.5, SHORT_SHARE, SHORT_SHARE, 0.0, LOCAL_SHARE, 0.0)
+_FAR = _Scale(1.5, 3.0 * SHORT_SHARE, 0.5, 0.0, LOCAL_SHARE, 0.0)  # tells corners from zigzags
+# Along zigzags: over a shorter way than this their steps still show, so nothing is local.
+_COARSE = _Scale(2.0, SHORT_SHARE, 2.0 * SHORT_SHARE, 1.0, np.inf, 1.0)
 
 
 class _Path(NamedTuple):
     """The vertices of one curve in their order; a loop ends with its first vertex."""
 
     vertex: IndexArray
+    place: FloatArray  # (n, 3) of the vertices, or smoothed
     at: FloatArray  # arc length
     turn: FloatArray  # degrees where it is sharp, otherwise 0
     is_largest: BoolArray  # whether none within reach is larger
+
+
+class _Room(NamedTuple):
+    """To smooth a curve in."""
+
+    sums: FloatArray  # (n, 3) integral of the places from the start to every vertex
+    smoothed: FloatArray  # (n, 3)
 
 
 def find_corners(
@@ -77,8 +88,8 @@ def find_corners(
     the curve turns by more than ``angle`` between the points half a target length behind and ahead,
     does not go on turning beyond them (unlike an arc of any radius), and turns more here than anywhere
     else within half a target length. A circle has no corners, a rectangle four. Where most such corners
-    are the steps of zigzags finer than the target length, as along borders of voxel labels, all is
-    measured over two target lengths instead.
+    are the steps of zigzags finer than the target length, as along borders of voxel labels, the
+    curves that have them are smoothed before, and measured over two target lengths.
 
     Parameters
     ----------
@@ -97,55 +108,73 @@ def find_corners(
     if not len(curves.edges):
         return is_end
     limit = CORNER_TURN if angle is None or isinstance(angle, str) else float(angle)
+    surface = X, origin, twin
     is_corner = is_end.copy()
-    found, passing = _mark_turns(X, origin, twin, curves, limit + STEP, _FINE, is_corner)
+    found, passing = _mark_turns(surface, curves, limit + STEP, False, is_corner)
     if passing >= max(ZIGZAG_CORNERS, ZIGZAG_SHARE * found):
         is_corner = is_end
-        _mark_turns(X, origin, twin, curves, limit + STEP, _COARSE, is_corner)
+        _mark_turns(surface, curves, limit + STEP, True, is_corner)
     return is_corner
 
 
 @kernel
-def _mark_turns(X, origin, twin, curves, limit, scale, is_corner):
+def _mark_turns(surface, curves, limit, has_zigzags, is_corner):
     """Walk every curve once, in one direction, and mark where it turns sharply.
 
-    Returns how many vertices were marked, and at how many of them the curve does not turn over a longer
-    way.
+    Returns how many vertices turn sharply, and at how many of them the curve does not over a longer way.
     """
+    X, origin, _ = surface
     edges = curves.edges
-    found = 0
-    passing = 0
+    total = total_passing = 0
     is_done = np.zeros(origin.size, np.bool_)
     size = edges.size + 1
-    path = _Path(np.empty(size, np.int32), np.empty(size), np.empty(size), np.empty(size, np.bool_))
+    at, turn, is_largest = np.empty(size), np.empty(size), np.empty(size, np.bool_)
+    path = _Path(np.empty(size, np.int32), np.empty((size, 3)), at, turn, is_largest)
+    room = _Room(np.empty((size, 3)), np.empty((size, 3)))
     for loops in range(2):
         for first in range(edges.size):
             if is_done[edges[first]] or (not loops and curves.before[first] != NONE):
                 continue
-            n = _unroll(X, origin, twin, curves, first, is_done, path)
+            n = _unroll(surface, curves, first, is_done, path)
             is_corner[path.vertex[0]] |= not loops
             is_corner[path.vertex[n]] |= not loops
-            for i in range(n + 1):
-                path.turn[i] = 0.0
-                if 0 < i < n or (loops and i == 0):
-                    path.turn[i] = _sharp_turn(X, path, n, loops, i, limit, scale)
-            _mark_largest(X, path, n, loops, scale)
+            found, passing = _find_sharp(X, path, n, loops, limit, _FINE)
+            total += found
+            total_passing += passing
+            if has_zigzags and passing > 0 and passing >= ZIGZAG_SHARE * found:
+                _smooth(X, path, n, loops, _COARSE, room)
+                _find_sharp(X, path, n, loops, limit, _COARSE)
             for i in range(n):
-                if path.is_largest[i]:
-                    is_corner[path.vertex[i]] = True
-                    far = _reach(X, path, n, loops, i, _FAR)
-                    found += 1
-                    passing += _turn(X, path, n, loops, i, far) <= limit
+                is_corner[path.vertex[i]] |= path.is_largest[i]
+    return total, total_passing
+
+
+@inlined
+def _find_sharp(X, path, n, is_loop, limit, scale):
+    """Mark the largest of the sharp turns of a curve; returns as `_mark_turns`."""
+    for i in range(n + 1):
+        path.turn[i] = 0.0
+        if 0 < i < n or (is_loop and i == 0):
+            path.turn[i] = _sharp_turn(X, path, n, is_loop, i, limit, scale)
+    _mark_largest(X, path, n, is_loop, scale)
+    found = passing = 0
+    for i in range(n):
+        if path.is_largest[i]:
+            far = _reach(X, path, n, is_loop, i, _FAR)
+            found += 1
+            passing += _turn(path, n, is_loop, i, far) <= limit
     return found, passing
 
 
 @inlined
-def _unroll(X, origin, twin, curves, first, is_done, path):
+def _unroll(surface, curves, first, is_done, path):
     """List the vertices of a curve and their arc lengths; returns the number of its edges."""
-    edges, vertex, at = curves.edges, path.vertex, path.at
+    X, origin, twin = surface
+    edges, vertex, place, at = curves.edges, path.vertex, path.place, path.at
     n = 0
     vertex[0] = origin[edges[first]]
     at[0] = 0.0
+    place[0, 0], place[0, 1], place[0, 2] = point(X, vertex[0])
     i = np.int64(first)
     while i != NONE and not is_done[edges[i]]:
         h = edges[i]
@@ -154,9 +183,57 @@ def _unroll(X, origin, twin, curves, first, is_done, path):
             is_done[twin[h]] = True
         n += 1
         vertex[n] = origin[next_halfedge(h)]
-        at[n] = at[n - 1] + sqrt(distance_squared(X, vertex[n - 1], vertex[n]))
+        place[n, 0], place[n, 1], place[n, 2] = point(X, vertex[n])
+        at[n] = at[n - 1] + sqrt(distance_squared(place, n - 1, n))
         i = np.int64(curves.after[i])
     return n
+
+
+@inlined
+def _smooth(X, path, n, is_loop, scale, room):
+    """Put every vertex to the mean of the curve around it; the ends of an open curve stay."""
+    vertex, place, at, _, _ = path
+    sums, smoothed = room
+    total = at[n]
+    sums[0, 0] = sums[0, 1] = sums[0, 2] = 0.0
+    for i in range(1, n + 1):
+        for k in range(3):
+            sums[i, k] = sums[i - 1, k] + 0.5 * (place[i - 1, k] + place[i, k]) * (
+                at[i] - at[i - 1]
+            )
+    for i in range(n + 1):
+        half = min(scale.window * X[vertex[i], 3], 0.5 * scale.of_loop * total)
+        if not is_loop:
+            half = min(half, at[i], total - at[i])
+        if half <= 0.0:
+            smoothed[i, 0], smoothed[i, 1], smoothed[i, 2] = point(place, i)
+            continue
+        ahead = _integral(path, n, sums, is_loop, at[i] + half)
+        behind = _integral(path, n, sums, is_loop, at[i] - half)
+        for k in range(3):
+            smoothed[i, k] = (ahead[k] - behind[k]) / (2.0 * half)
+    for i in range(n + 1):
+        place[i, 0], place[i, 1], place[i, 2] = point(smoothed, i)
+    for i in range(1, n + 1):
+        at[i] = at[i - 1] + sqrt(distance_squared(place, i - 1, i))
+
+
+@inlined
+def _integral(path, n, sums, is_loop, where):
+    """Integral of the places along the curve up to an arc length; around a loop it goes on."""
+    place, at = path.place, path.at
+    turns = 0.0
+    if is_loop:
+        turns = (1.0 if where > at[n] else 0.0) - (1.0 if where < 0.0 else 0.0)
+        where -= turns * at[n]
+    low, share = _find_along(path, n, where)
+    x, y, z = _between(place, low, share)
+    way = 0.5 * share * (at[low + 1] - at[low])
+    return (
+        turns * sums[n, 0] + sums[low, 0] + way * (place[low, 0] + x),
+        turns * sums[n, 1] + sums[low, 1] + way * (place[low, 1] + y),
+        turns * sums[n, 2] + sums[low, 2] + way * (place[low, 2] + z),
+    )
 
 
 @inlined
@@ -173,25 +250,25 @@ def _sharp_turn(X, path, n, is_loop, i, limit, scale):
     if not is_loop and from_end < scale.from_end * X[path.vertex[i], 3]:
         return 0.0
     reach = _reach(X, path, n, is_loop, i, scale)
-    near = _turn(X, path, n, is_loop, i, reach)
+    near = _turn(path, n, is_loop, i, reach)
     if near <= limit:
         return 0.0
-    if near >= CORNER_SHARE * _turn(X, path, n, is_loop, i, 2.0 * reach):
+    if near >= CORNER_SHARE * _turn(path, n, is_loop, i, 2.0 * reach):
         return near
-    return near if _turn(X, path, n, is_loop, i, 0.5 * reach) >= LOCAL_SHARE * near else 0.0
+    return near if _turn(path, n, is_loop, i, 0.5 * reach) >= scale.local_share * near else 0.0
 
 
 @inlined
-def _turn(X, path, n, is_loop, i, reach):
+def _turn(path, n, is_loop, i, reach):
     """Angle in degrees between the chords from the point ``reach`` behind and to the one ahead.
 
     Near the end of an open curve the chord leads to its end.
     """
-    v = path.vertex[i]
-    bx, by, bz = _point_along(X, path, n, is_loop, path.at[i] - reach)
-    ax, ay, az = _point_along(X, path, n, is_loop, path.at[i] + reach)
-    ax, ay, az = ax - X[v, 0], ay - X[v, 1], az - X[v, 2]
-    bx, by, bz = X[v, 0] - bx, X[v, 1] - by, X[v, 2] - bz
+    place, at = path.place, path.at
+    bx, by, bz = _point_along(path, n, is_loop, at[i] - reach)
+    ax, ay, az = _point_along(path, n, is_loop, at[i] + reach)
+    ax, ay, az = ax - place[i, 0], ay - place[i, 1], az - place[i, 2]
+    bx, by, bz = place[i, 0] - bx, place[i, 1] - by, place[i, 2] - bz
     norm = sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz))
     if norm == 0.0:
         return 0.0
@@ -199,12 +276,19 @@ def _turn(X, path, n, is_loop, i, reach):
 
 
 @inlined
-def _point_along(X, path, n, is_loop, where):
+def _point_along(path, n, is_loop, where):
     """Point of the curve at an arc length."""
-    at = path.at
     if is_loop:
-        where += at[n] if where < 0.0 else 0.0
-        where -= at[n] if where > at[n] else 0.0
+        where += path.at[n] if where < 0.0 else 0.0
+        where -= path.at[n] if where > path.at[n] else 0.0
+    low, share = _find_along(path, n, where)
+    return _between(path.place, low, share)
+
+
+@inlined
+def _find_along(path, n, where):
+    """Find an arc length: the edge, by its number, and the share of it that lies before."""
+    at = path.at
     where = min(max(where, 0.0), at[n])
     low, high = 0, n
     while high - low > 1:
@@ -214,19 +298,24 @@ def _point_along(X, path, n, is_loop, where):
         else:
             high = middle
     step = at[high] - at[low]
-    share = (where - at[low]) / step if step > 0.0 else 0.0
-    a, b = path.vertex[low], path.vertex[high]
+    return low, (where - at[low]) / step if step > 0.0 else 0.0
+
+
+@inlined
+def _between(place, low, share):
+    """Point on the edge after a vertex."""
+    x, y, z = place[low, 0], place[low, 1], place[low, 2]
     return (
-        X[a, 0] + share * (X[b, 0] - X[a, 0]),
-        X[a, 1] + share * (X[b, 1] - X[a, 1]),
-        X[a, 2] + share * (X[b, 2] - X[a, 2]),
+        x + share * (place[low + 1, 0] - x),
+        y + share * (place[low + 1, 1] - y),
+        z + share * (place[low + 1, 2] - z),
     )
 
 
 @inlined
 def _mark_largest(X, path, n, is_loop, scale):
     """Mark vertices with the largest turn within reach; of equal ones the smaller vertex."""
-    vertex, at, turn, is_largest = path
+    vertex, _, at, turn, is_largest = path
     for i in range(n):
         is_largest[i] = turn[i] != 0.0
         if turn[i] == 0.0:

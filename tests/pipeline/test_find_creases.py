@@ -7,6 +7,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from data.shapes import cad_parts, voxels
+from data.shapes.basic import voxels as blocks
 from remeshvec import Adaptive, OptionError, find_creases, remesh
 from remeshvec.mesh.edges import edge_keys, unique_edges
 
@@ -115,6 +116,28 @@ def test_borders_of_painted_labels_come_out_smooth():
     assert set(result.face_labels) == {0, 1, 2}
     for label in (0, 1, 2):
         assert n_parts(result.F[result.face_labels == label]) == n_parts(F[labels == label])
+
+
+@pytest.mark.parametrize("L", [1.5, 2.0, 3.0])
+def test_corners_beside_zigzags_stay_and_those_of_zigzags_do_not(L):
+    """A square's corner lies within 2 L of a border that climbs from pixel to pixel."""
+    V, F, labels = voxels.painted_sheet()
+    result = remesh(V, F, L, face_labels=labels)
+    found = set(map(tuple, result.V[result.corners, :2].tolist()))
+    square = {(x, y) for x in (0.0, 30.0) for y in (0.0, 30.0)}
+    ends = {(0.0, 14.0), (0.0, 20.0), (30.0, 22.0), (30.0, 28.0)}
+    assert found == square | ends
+
+
+@pytest.mark.parametrize("direction", [(1, 0, 0), (0.8, 0.5, 0.33), (1, 1, 0.2)])
+def test_borders_around_a_ball_of_blocks_have_no_corners(direction):
+    x, y, z = voxels.grid(30)
+    V, F = blocks(x**2 + y**2 + z**2 < 10**2)
+    normals = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]])
+    voxel = np.round(V[F].mean(axis=1) - 0.4 * normals - 0.5)  # normals have length 1
+    labels = ((voxel - voxel.mean(axis=0)) @ direction > 0).astype(int)
+    for L in (1.5, 2.0, 3.0, 4.0):
+        assert len(remesh(V, F, L, face_labels=labels).corners) == 0
 
 
 def n_parts(F):
