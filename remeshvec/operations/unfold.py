@@ -12,12 +12,13 @@ import numpy as np
 
 from ..core.compiler import inlined, threaded
 from ..core.geometry import area_vector, point, turn_exceeds
-from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, FloatArray, Mesh
+from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, FloatArray, Mesh, Tree
 from ..mesh.blocks import make_candidates, per_block
 from ..mesh.walk import corners_of
 from .folds import NO_AREA, area_vectors, is_folded, squared_norm
+from .turned import find_turned_faces
 
-__all__ = ["undo_folded_edges", "undo_folds"]
+__all__ = ["undo_folded_edges", "undo_folds", "undo_turned_faces"]
 
 # A face may turn by 60 degrees.
 _COSINE = 0.5
@@ -73,6 +74,29 @@ def undo_folded_edges(mesh: Mesh, blocks: Blocks, before: FloatArray, parallel: 
         if not count.any():
             return total
         total += int(count.sum())
+
+
+def undo_turned_faces(
+    mesh: Mesh, blocks: Blocks, before: FloatArray, tree: Tree, parallel: bool
+) -> int:
+    """Put back the inner vertices of faces that moves have turned against the input; returns how many.
+
+    A whole ring may turn over with no edge of it folded. Repeats as `undo_folds`; ``before`` is (n, 4).
+    """
+    total = 0
+    turned = find_turned_faces(mesh, blocks, tree, parallel)
+    if not len(turned):
+        return 0
+    old = find_turned_faces(mesh._replace(X=before), blocks, tree, parallel)
+    marked = np.zeros(mesh.vertex_halfedge.size, np.uint8)
+    while True:
+        marked[mesh.origin.reshape(-1, 3)[np.setdiff1d(turned, old)]] = 1
+        count = np.zeros(len(blocks.face) - 1, np.int64)
+        _put_back(parallel, mesh, blocks, before, marked, count)
+        if not count.any():
+            return total
+        total += int(count.sum())
+        turned = find_turned_faces(mesh, blocks, tree, parallel)
 
 
 @threaded(per_block)

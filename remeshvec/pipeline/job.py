@@ -23,6 +23,7 @@ from ..sweeps.finish import deviation_of, finish, has_finish
 from ..sweeps.flaws import (
     CrossingCheck,
     FoldCheck,
+    TurnedCheck,
     count_more_crossings,
     count_new_flaws,
     has_crossings_at_curves,
@@ -195,13 +196,15 @@ class Job:
         A guard against crossings takes several times as long as one against folds alone, and holds
         more than it must where an input crosses itself.
         """
-        folds = FoldCheck(self.parallel)
+        folds: tuple[Check, ...] = (FoldCheck(self.parallel),)
+        if self.recipe.project:
+            folds += (TurnedCheck(featured.reference.tree, self.parallel),)
         crossings = CrossingCheck(self.parallel, self.recipe.avoid_intersections)
         has_folds = best.n_flaws > 0
         if has_folds and self._may_mend(best.work):
             mend_folds(best.work, before, make_schedule(self.recipe)[-1])
             best = self._judged(best, before)
-        guards: list[tuple[Check, ...]] = [(folds,), (folds, crossings)]
+        guards = [folds, (*folds, crossings)]
         for checks in guards[self.recipe.avoid_intersections or not has_folds :]:
             if not (best.n_flaws or best.n_crossings) or self.monitor.is_cancelled:
                 break
@@ -213,7 +216,7 @@ class Job:
     def _judged(self, swept: Swept, before: Mesh) -> Swept:
         """Count flaws, and faces that have come to cross others."""
         after = swept.work.mesh
-        n_flaws = self._count_flaws(before, after)
+        n_flaws = self._count_flaws(before, swept.work)
         n_crossings = count_more_crossings(before, after, self.parallel)
         return replace(swept, n_flaws=n_flaws, n_crossings=n_crossings)
 
@@ -223,11 +226,13 @@ class Job:
         bound = plan.max_deviation is not None or plan.adaptation is not None or plan.count
         return not (bound or work.featured.on_non_manifold is not None or self.monitor.is_cancelled)
 
-    def _count_flaws(self, before: Mesh, after: Mesh) -> int:
+    def _count_flaws(self, before: Mesh, work: Work) -> int:
         """Count the flaws that sweeps have made."""
         if self.monitor.is_cancelled:
             return 0
-        return count_new_flaws(before, after, self.recipe.avoid_intersections, self.parallel)
+        tree = work.featured.reference.tree if self.recipe.project else None
+        crossings = self.recipe.avoid_intersections
+        return count_new_flaws(before, work.mesh, tree, crossings, self.parallel)
 
     def _swept(
         self, mesh: Mesh, before: Mesh, featured: FeaturedReference, checks: tuple[Check, ...]
@@ -243,7 +248,7 @@ class Job:
         stop = run_sweeps(work, schedule, guard)
         if has_finish(work):
             finish(work, guard)
-        return Swept(work, stop, self.monitor.counts, self._count_flaws(before, work.mesh))
+        return Swept(work, stop, self.monitor.counts, self._count_flaws(before, work))
 
     def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
         """Set the lengths of a mesh, mark its features, build the reference."""

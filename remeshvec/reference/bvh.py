@@ -277,7 +277,7 @@ def search_face(tree, p, face, normal, stack):
             for f in range(LEAF * i, min(LEAF * i + LEAF, tree.corners.shape[0])):
                 if f != seen and tree.patch[f] == patch:
                     fs, ft, fd = face_distance(tree.corners, f, p)
-                    if fd < distance and not _looks_away(tree.corners, f, normal):
+                    if fd < distance and not looks_away(tree.corners, f, normal):
                         best, s, t, distance = f, fs, ft, fd
             continue
         start = tree.level[d - 1]
@@ -291,7 +291,36 @@ def search_face(tree, p, face, normal, stack):
 
 
 @inlined
-def _looks_away(corners, f, normal):
+def has_agreeing_face(tree, p, normal, reach_squared, stack):
+    """Tell whether a face of any patch that looks the same way is within reach of a point."""
+    top = tree.level.size - 2
+    stack[0, 0] = 0
+    stack[1, 0] = top
+    size = 1
+    while size > 0:
+        size -= 1
+        i = stack[0, size]
+        d = stack[1, size]
+        if d == 0:
+            for f in range(LEAF * i, min(LEAF * i + LEAF, tree.corners.shape[0])):
+                if not looks_away(tree.corners, f, normal):
+                    _, _, distance = face_distance(tree.corners, f, p)
+                    if distance <= reach_squared:
+                        return True
+            continue
+        start = tree.level[d - 1]
+        end = min(start + ARITY * i + ARITY, tree.level[d])
+        for j in range(start + ARITY * i, end):
+            if _box_distance(tree.boxes, j, p) <= reach_squared:
+                stack[0, size] = j - start
+                stack[1, size] = d - 1
+                size += 1
+    return False
+
+
+@inlined
+def looks_away(corners, f, normal):
+    """Tell whether a face looks against a normal."""
     a, b, c = corner(corners, f, 0), corner(corners, f, 1), corner(corners, f, 2)
     x, y, z = face_vector(a, b, c)
     return x * normal[0] + y * normal[1] + z * normal[2] < 0.0

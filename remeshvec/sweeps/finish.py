@@ -8,7 +8,7 @@ import numpy as np
 
 from ..operations.fit import fit_vertices
 from ..operations.project import project_vertices
-from ..operations.unfold import undo_folded_edges, undo_folds
+from ..operations.unfold import undo_folded_edges, undo_folds, undo_turned_faces
 from ..operations.untangle import untangle_vertices
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_copies
@@ -80,6 +80,8 @@ def polish(work: Work) -> None:
         )
     for _ in range(recipe.fit_rounds):
         fit_vertices(mesh, blocks, reference.tree, _FIT_REACH, parallel)
+    if recipe.project:
+        undo_turned_faces(mesh, blocks, before, reference.tree, parallel)
     undo_folded_edges(mesh, blocks, before, parallel)
 
 

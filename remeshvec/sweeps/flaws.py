@@ -1,4 +1,4 @@
-"""Checks of a sweep against flaws: folds, faces without area, and faces that cross others.
+"""Checks of a sweep against flaws: folds, faces without area, turned over, or through others.
 
 What an input has of them may stay, or become less.
 """
@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.vocabulary import CURVE, DEAD, BoolArray, FloatArray, IndexArray, Mesh
+from ..core.vocabulary import CURVE, DEAD, BoolArray, FloatArray, IndexArray, Mesh, Tree
 from ..mesh.blocks import make_blocks
 from ..operations.folds import area_vectors, find_flat_faces, find_folds, has_folds
+from ..operations.turned import find_turned_faces
 from ..reference.crossings import crossing_faces
 from .guard import LazyTree, Offenders, lazy_tree, tree_of
 
 __all__ = [
     "CrossingCheck",
     "FoldCheck",
+    "TurnedCheck",
     "count_more_crossings",
     "count_new_flaws",
     "has_crossings_at_curves",
@@ -35,6 +37,10 @@ def _ends(mesh: Mesh, h: IndexArray) -> tuple[FloatArray, FloatArray]:
 def _corners(mesh: Mesh, faces: IndexArray) -> Offenders:
     vertices = np.unique(mesh.origin.reshape(-1, 3)[faces])
     return Offenders(np.empty((0, 3)), vertices.astype(np.int32))
+
+
+def _middles(mesh: Mesh, faces: IndexArray) -> FloatArray:
+    return np.asarray(mesh.X[mesh.origin.reshape(-1, 3)[faces], :3].mean(axis=1))
 
 
 class _Places:
@@ -77,7 +83,7 @@ class FoldCheck:
         share = ((place + 0.5) / steps[edge])[:, None]
         self.folds = _Places(a[edge] + share * (b - a)[edge], float(length.sum()))
         flat = find_flat_faces(mesh, vectors)
-        self.flat = _Places(self._middles(mesh, flat), float(len(flat)))
+        self.flat = _Places(_middles(mesh, flat), float(len(flat)))
 
     def offenders(self, mesh: Mesh, tree: LazyTree) -> Offenders:
         """Corners of the faces at new folded edges, and of new faces without area."""
@@ -88,16 +94,44 @@ class FoldCheck:
         reach = np.maximum(_NEAR * mesh.X[mesh.origin[h], 3], length)
         is_new = self.folds.new(middle, length, reach)
         flat = find_flat_faces(mesh, vectors)
-        points = self._middles(mesh, flat)
+        points = _middles(mesh, flat)
         reach = _NEAR * mesh.X[mesh.origin[3 * flat], 3]
         is_new_flat = self.flat.new(points, np.ones(len(flat)), reach)
         new = h[is_new]
         faces = np.concatenate([new // 3, mesh.twin[new] // 3, flat[is_new_flat]])
         return _corners(mesh, faces)
 
-    @staticmethod
-    def _middles(mesh: Mesh, faces: IndexArray) -> FloatArray:
-        return np.asarray(mesh.X[mesh.origin.reshape(-1, 3)[faces], :3].mean(axis=1))
+
+class TurnedCheck:
+    """No faces turned over against the input that were not.
+
+    Parameters
+    ----------
+    input_tree : Tree
+        Over the faces of the input.
+    parallel : bool
+    """
+
+    def __init__(self, input_tree: Tree, parallel: bool) -> None:
+        self.input_tree = input_tree
+        self.parallel = parallel
+        self.turned = _Places(np.empty((0, 3)), 0.0)
+
+    def remember(self, mesh: Mesh, tree: LazyTree) -> None:
+        """Note which faces are turned over: on noisy inputs splits alone may do it."""
+        faces = _turned(mesh, self.input_tree, self.parallel)
+        self.turned = _Places(_middles(mesh, faces), float(len(faces)))
+
+    def offenders(self, mesh: Mesh, tree: LazyTree) -> Offenders:
+        """Corners of faces that have turned over."""
+        faces = _turned(mesh, self.input_tree, self.parallel)
+        reach = _NEAR * mesh.X[mesh.origin[3 * faces], 3]
+        is_new = self.turned.new(_middles(mesh, faces), np.ones(len(faces)), reach)
+        return _corners(mesh, faces[is_new])
+
+
+def _turned(mesh: Mesh, input_tree: Tree, parallel: bool) -> IndexArray:
+    return find_turned_faces(mesh, make_blocks(mesh), input_tree, parallel)
 
 
 class CrossingCheck:
@@ -131,12 +165,17 @@ class CrossingCheck:
         return alive[found], corners.mean(axis=1), 0.5 * np.linalg.norm(normals, axis=1)
 
 
-def count_new_flaws(before: Mesh, after: Mesh, crossings: bool, parallel: bool) -> int:
-    """Count the vertices at flaws that a mesh has and an earlier one has not.
+def count_new_flaws(
+    before: Mesh, after: Mesh, input_tree: Tree | None, crossings: bool, parallel: bool
+) -> int:
+    """Count the vertices at flaws that a mesh has and an earlier one, the input, has not.
 
-    Crossings count only if asked for: to look for them takes longer.
+    Faces turned over count where the tree over the input is given, crossings only if asked for: to look
+    for them takes longer.
     """
     count = 0
+    if input_tree is not None:
+        count += len(_corners(after, _turned(after, input_tree, parallel)).vertices)
     if has_folds(after, make_blocks(after), parallel):
         check = FoldCheck(parallel)
         check.remember(before, lazy_tree(before, parallel))

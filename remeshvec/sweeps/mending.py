@@ -1,4 +1,4 @@
-"""Mend the few folds that sweeps left: sweep again around them, with shorter and shorter edges.
+"""Mend the few folds and turned faces that sweeps left: sweep again around them, with shorter and shorter edges.
 
 Most folds lie alone on a tip or a ridge that is thin beside L. More of the same often opens them, or
 edges as short as the place needs; everything else stays as it is.
@@ -13,8 +13,8 @@ from ..mesh.edge_curves import is_locked
 from ..mesh.walk import ends_of
 from ..operations.split import split_edges
 from .finish import polish
-from .flaws import FoldCheck
-from .guard import lazy_tree
+from .flaws import FoldCheck, TurnedCheck
+from .guard import Check, lazy_tree
 from .holding import hold, let_go, rings_around
 from .phases import collapse, flip, project, relax
 from .plan import Sweep
@@ -36,7 +36,7 @@ _RINGS = 2 * _SHORTER_RINGS
 
 
 def mend_folds(work: Work, before: Mesh, sweep: Sweep) -> None:
-    """Sweep over the surroundings of new folds and new faces without area; keep what lessens them.
+    """Sweep over the surroundings of new folds, faces without area, or turned over; keep what lessens them.
 
     Parameters
     ----------
@@ -47,9 +47,12 @@ def mend_folds(work: Work, before: Mesh, sweep: Sweep) -> None:
     sweep : Sweep
         What a round does.
     """
-    check = FoldCheck(work.is_parallel)
-    check.remember(before, lazy_tree(before, work.is_parallel))
-    flaws = _vertices(check, work)
+    folds = FoldCheck(work.is_parallel)
+    folds.remember(before, lazy_tree(before, work.is_parallel))
+    checks: list[Check] = [folds]
+    if work.plan.recipe.project:
+        checks.append(TurnedCheck(work.featured.reference.tree, work.is_parallel))
+    flaws = _vertices(checks, work)
     for n in range(_ROUNDS):
         if not 0 < len(flaws) <= _MOST:
             break
@@ -57,17 +60,19 @@ def mend_folds(work: Work, before: Mesh, sweep: Sweep) -> None:
         work.monitor.begin_sweep()
         if n > 0:
             _split_around(trial, flaws, sweep)
-        _sweep_around(trial, _vertices(check, trial), _RINGS + n, sweep)
+        _sweep_around(trial, _vertices(checks, trial), _RINGS + n, sweep)
         work.monitor.counts.pop()
-        left = _vertices(check, trial)
+        left = _vertices(checks, trial)
         if len(left) <= len(flaws):
             work.adopt(trial)
             flaws = left
 
 
-def _vertices(check: FoldCheck, work: Work) -> IndexArray:
+def _vertices(checks: list[Check], work: Work) -> IndexArray:
     """Vertices at flaws."""
-    return check.offenders(work.mesh, lazy_tree(work.mesh, work.is_parallel)).vertices
+    tree = lazy_tree(work.mesh, work.is_parallel)
+    found = [check.offenders(work.mesh, tree).vertices for check in checks]
+    return np.unique(np.concatenate(found))
 
 
 def _split_around(work: Work, vertices: IndexArray, sweep: Sweep) -> None:
