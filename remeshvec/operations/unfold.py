@@ -12,13 +12,13 @@ import numpy as np
 
 from ..core.compiler import inlined, threaded
 from ..core.geometry import area_vector, point, turn_exceeds
-from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, FloatArray, Mesh, Tree
+from ..core.vocabulary import CURVE, DEAD, INNER, NONE, Blocks, FloatArray, IndexArray, Mesh, Tree
 from ..mesh.blocks import make_candidates, per_block
 from ..mesh.walk import corners_of
 from .folds import NO_AREA, area_vectors, is_folded, squared_norm
 from .turned import find_turned_faces
 
-__all__ = ["undo_folded_edges", "undo_folds", "undo_turned_faces"]
+__all__ = ["restore_births", "undo_folded_edges", "undo_folds", "undo_turned_faces"]
 
 # A face may turn by 60 degrees.
 _COSINE = 0.5
@@ -97,6 +97,13 @@ def undo_turned_faces(
             return total
         total += int(count.sum())
         turned = find_turned_faces(mesh, blocks, tree, parallel)
+
+
+def restore_births(mesh: Mesh, before: FloatArray, births: IndexArray, n_undone: int) -> None:
+    """Give vertices that were put back the births that they had there."""
+    if n_undone:
+        same = (mesh.X[:, :3] == before[:, :3]).all(axis=1)
+        mesh.birth[same] = births[same]
 
 
 @threaded(per_block)

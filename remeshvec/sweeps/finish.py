@@ -8,7 +8,12 @@ import numpy as np
 
 from ..operations.fit import fit_vertices
 from ..operations.project import project_vertices
-from ..operations.unfold import undo_folded_edges, undo_folds, undo_turned_faces
+from ..operations.unfold import (
+    restore_births,
+    undo_folded_edges,
+    undo_folds,
+    undo_turned_faces,
+)
 from ..operations.untangle import untangle_vertices
 from ..reference.bvh import WALK_TRUST
 from ..reference.non_manifold import non_manifold_copies
@@ -63,7 +68,7 @@ def polish(work: Work) -> None:
     """Move vertices for the last time: onto the input, out of bad triangles, to a closer fit."""
     mesh, blocks, recipe = work.mesh, work.blocks, work.plan.recipe
     reference, parallel = work.featured.reference, work.is_parallel
-    before = mesh.X.copy()
+    before, births = mesh.X.copy(), mesh.birth.copy()
     if recipe.project:
         project_vertices(mesh, blocks, reference, WALK_TRUST, parallel)
         undo_folds(mesh, blocks, before, parallel)
@@ -80,9 +85,11 @@ def polish(work: Work) -> None:
         )
     for _ in range(recipe.fit_rounds):
         fit_vertices(mesh, blocks, reference.tree, _FIT_REACH, parallel)
+    n_undone = undo_folded_edges(mesh, blocks, before, parallel)
+    restore_births(mesh, before, births, n_undone)
     if recipe.project:
-        undo_turned_faces(mesh, blocks, before, reference.tree, parallel)
-    undo_folded_edges(mesh, blocks, before, parallel)
+        n_undone = undo_turned_faces(mesh, blocks, before, reference.tree, parallel)
+        restore_births(mesh, before, births, n_undone)
 
 
 def deviation_of(work: Work) -> dict[str, float]:
