@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 
 from ..core.compiler import inlined, threaded
-from ..core.geometry import area_vector, point
+from ..core.geometry import area_vector
 from ..core.vocabulary import CURVE, DEAD, Blocks, IndexArray, Mesh, Tree
 from ..mesh.blocks import make_candidates, per_block
 from ..mesh.walk import corners_of
