@@ -1,4 +1,4 @@
-"""Mend the few folds and turned faces that sweeps left: sweep again around them, with shorter and shorter edges.
+"""Mend the few folds and turned faces that sweeps left: sweep around them, with ever shorter edges.
 
 Most folds lie alone on a tip or a ridge that is thin beside L. More of the same often opens them, or
 edges as short as the place needs; everything else stays as it is.
@@ -36,7 +36,7 @@ _RINGS = 2 * _SHORTER_RINGS
 
 
 def mend_folds(work: Work, before: Mesh, sweep: Sweep) -> None:
-    """Sweep over the surroundings of new folds, faces without area, or turned over; keep what lessens them.
+    """Sweep around new folds, and new faces without area or turned over; keep what lessens them.
 
     Parameters
     ----------

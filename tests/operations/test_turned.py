@@ -10,7 +10,7 @@ from remeshvec.operations.unfold import restore_births, undo_folded_edges, undo_
 
 
 def shaken_grid(amount):
-    """Flat mesh whose inner vertices have moved within the plane, the tree over it, and where they were."""
+    """Flat mesh whose inner vertices moved within the plane; the tree over it, and the old places."""
     V, F = zoo.grid(8, 8)
     mesh = built(V, F)
     tree, before = tree_of(mesh), mesh.X.copy()
