@@ -6,7 +6,7 @@ from math import cos, inf, radians, tan
 
 import numpy as np
 
-from ..core.vocabulary import FloatArray
+from ..core.vocabulary import FloatArray, IndexArray
 from ..input.recipe import Rounds
 from ..operations.flip import FlipLimits, flip_edges
 from ..operations.frames import FRAME_SIZE, measure_frames
@@ -14,7 +14,7 @@ from ..operations.lloyd import Pace, run_lloyd_round, turn_velocities
 from ..operations.project import project_vertices
 from ..operations.slide import slide_vertices
 from ..operations.spread import area_spread
-from ..operations.unfold import undo_folded_edges
+from ..operations.unfold import restore_births, undo_folded_edges
 from ..reference.bvh import WALK_TRUST
 from .guard import Guard
 from .phases import refresh_lengths
@@ -78,7 +78,7 @@ def run_rounds(work: Work, rounds: Rounds) -> None:
     for first in range(0, rounds.number, _PROJECT_EVERY):
         if work.monitor.is_cancelled or _has_settled(work, settling, first):
             return
-        start = mesh.X.copy()
+        start, births = mesh.X.copy(), mesh.birth.copy()
         measure_frames(mesh, blocks, rounds.stiffness, frames, parallel)
         turn_velocities(mesh, blocks, frames, velocity, parallel)
         for n in range(first, min(first + _PROJECT_EVERY, rounds.number)):
@@ -87,7 +87,7 @@ def run_rounds(work: Work, rounds: Rounds) -> None:
             slide_vertices(mesh, blocks, work.featured.reference, parallel)
             run_lloyd_round(mesh, blocks, frames, velocity, pace, work.varies, parallel)
         _project(work)
-        _unfold(work, start, velocity)
+        _unfold(work, start, births, velocity)
         work.monitor.report("even out")
 
 
@@ -113,7 +113,9 @@ def _project(work: Work) -> None:
     refresh_lengths(work)
 
 
-def _unfold(work: Work, before: FloatArray, velocity: FloatArray) -> None:
+def _unfold(work: Work, before: FloatArray, births: IndexArray, velocity: FloatArray) -> None:
     """Take back moves that folded an edge, and stop the vertices that made them."""
-    if undo_folded_edges(work.mesh, work.blocks, before, work.is_parallel):
+    n_undone = undo_folded_edges(work.mesh, work.blocks, before, work.is_parallel)
+    restore_births(work.mesh, before, births, n_undone)
+    if n_undone:
         velocity[(work.mesh.X[:, :3] == before[:, :3]).all(axis=1)] = 0.0

@@ -39,6 +39,7 @@ from remeshvec.operations.relax import relax_vertices
 from remeshvec.operations.slide import slide_vertices
 from remeshvec.operations.split import compact, split_long_edges
 from remeshvec.operations.spread import area_spread
+from remeshvec.operations.turned import find_turned_faces
 from remeshvec.operations.unfold import undo_folded_edges, undo_folds
 from remeshvec.operations.untangle import untangle_vertices
 from remeshvec.output import extract
@@ -95,13 +96,21 @@ def phases():
         lambda m, b, r, p: (folds.find_folds(m, folds.area_vectors(m, b, p)), has(m, b, p)),
     )
     yield "crossings", lambda m, b, r, p: (crossing_faces(tree_of(m, False), p),)
+    yield "turned", lambda m, b, r, p: (turned(m, b, r, p),)
 
 
-LOOKS = ("locate", "closest", "measure", "spread", "folds", "crossings")  # they change no mesh
+# Phases that change no mesh.
+LOOKS = ("locate", "closest", "measure", "spread", "folds", "crossings", "turned")
 
 
 def has(mesh, blocks, parallel):
     return np.array(folds.has_folds(mesh, blocks, parallel))
+
+
+def turned(mesh, blocks, reference, parallel):
+    found = find_turned_faces(shifted(copied(mesh)), blocks, reference.tree, parallel)
+    assert len(found)
+    return found
 
 
 def write_out(mesh, parallel):
