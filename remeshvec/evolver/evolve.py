@@ -23,9 +23,11 @@ from ..core.vocabulary import FloatArray, IntArray
 from ..errors import MeshFormatError, OptionError
 from ..files.disk import reason
 from ..files.mesh_files import write_mesh
-from .minimize import Minimum, minimize, unmoved, with_restored_volumes
-from .problem import VOLUMES, CapillaryProblem, as_problem
-from .reshape import remeshed, with_cut_necks, without_crumbs
+from .minimize import Minimum, minimize, unmoved
+from .problem import VOLUMES, CapillaryProblem, as_problem, is_held
+from .reshape import remeshed, with_cut_necks, without_crumbs, without_parts
+from .room import find_lost, found_lost, room_of
+from .steps import with_restored_volumes
 
 __all__ = ["Evolution", "Frame", "evolve", "write_frames"]
 
@@ -56,7 +58,7 @@ class Frame:
     energy, residual : float
     components : int
     event : str
-        "sweep", "cut", "dropped" or "newton".
+        "sweep", "cut", "dropped", "fell" or "newton".
     """
 
     V: FloatArray
@@ -243,10 +245,12 @@ class _Run:
         self.plan, self.log = plan, log
         self.minimum = unmoved(self.now, "nothing is left")
         self.n_cuts = 0
+        self.room = room_of(self.now)
+        self.is_lost = False
 
     def is_over(self) -> bool:
-        """Tell whether the caller has cancelled, or no face is left."""
-        return self.log.is_cancelled or not len(self.now.F)
+        """Tell whether the caller has cancelled, no face is left, or there is no equilibrium."""
+        return self.log.is_cancelled or self.is_lost or not len(self.now.F)
 
     def settle(self, L: float) -> None:
         """Remesh and sweep until the energy changes little."""
@@ -282,10 +286,29 @@ class _Run:
         """Let the surface flow, and cut its necks; returns what happened, as `Frame.event` does."""
         self._minimise("flow", steps=_FLOW_STEPS)
         event = self._cut(L) if self.plan.cuts else "sweep"
+        event = self._let_fall() or event
         self.log.note(self.now, L, self.minimum.residual, event)
         return event
 
+    def _let_fall(self) -> str:
+        """Drop what has come off and left; says that there is no equilibrium if wires hold it."""
+        lost = find_lost(self.now, self.room)
+        if not len(lost):
+            return ""
+        kept = without_parts(self.now, lost)
+        if kept is None:
+            self.is_lost = True
+            self.minimum = replace(
+                self.minimum, converged=False, stop=found_lost(self.now, self.room)
+            )
+            return ""
+        self.now = kept
+        return "fell"
+
     def _minimise(self, method: str, **options: Any) -> None:
+        if not is_held(self.now):
+            self.minimum = unmoved(self.now, "nothing holds the surface")
+            return
         found = self.plan.backend(self.now, method, **options)
         self.minimum = instance(found, "the result of backend", Minimum, "a Minimum")
         self.now = self.minimum.problem

@@ -17,7 +17,7 @@ from ..mesh.edges import components, count_edges, halfedge_ends, used_vertices
 from .energies import areas, volumes
 from .forces import Forces, body_volumes_at, energy_at, forces_at, hessian_at
 
-__all__ = ["VOLUMES", "CapillaryProblem", "as_problem", "with_surface"]
+__all__ = ["VOLUMES", "CapillaryProblem", "as_problem", "check_held", "is_held", "with_surface"]
 
 VOLUMES = ("shared", "per_component")
 
@@ -70,7 +70,8 @@ class CapillaryProblem:
         V and F are not a mesh; or a volume or a density is given, but two faces run along an edge in the
         same direction, so that there is no inside.
     OptionError
-        An index is out of range, or a number is not finite or not positive where it must be.
+        An index is out of range, or a number is not finite or not positive where it must be; or a closed
+        surface is asked to enclose a volume of the other sign.
     """
 
     def __init__(
@@ -104,6 +105,7 @@ class CapillaryProblem:
         self.targets = np.empty(0)
         if self.volume is not None:
             self.targets = np.array([self.volume - self.volume_offset])
+            _check_sign(self)
         if is_apart:
             self.body, self.targets = _apart(self)
 
@@ -202,6 +204,20 @@ def as_problem(value: object) -> CapillaryProblem:
     return problem
 
 
+def is_held(problem: CapillaryProblem) -> bool:
+    """Tell whether a wire or a volume holds the surface, which otherwise shrinks to a point."""
+    return not len(problem.F) or bool(problem.fixed.any()) or len(problem.targets) > 0
+
+
+def check_held(problem: CapillaryProblem) -> None:
+    """Refuse a film that nothing holds."""
+    if not is_held(problem):
+        raise OptionError(
+            "nothing holds the surface, which would shrink to a point: give volume=, fixed= or "
+            "fixed_edges="
+        )
+
+
 def with_surface(
     problem: CapillaryProblem,
     V: FloatArray,
@@ -262,6 +278,20 @@ def _check_winding(F: IntArray) -> None:
             f"{which(bad, 'face')} of F run along an edge the same way as another, so that no volume is "
             "enclosed; remesh turns them where the surface is a manifold"
         )
+
+
+def _check_sign(problem: CapillaryProblem) -> None:
+    """Refuse to turn a closed surface inside out."""
+    _, uses = count_edges(problem.F)
+    target = float(problem.targets[0])
+    if len(uses) and (uses == 2).all():
+        now = float(volumes(problem.V[problem.F]).sum())
+        if now * target < 0.0:
+            raise OptionError(
+                f"volume must have the sign of what the faces enclose, {now:.6g}; got "
+                f"{problem.volume:g}. "
+                "Turn the faces, or the sign"
+            )
 
 
 def _as_edges(value: ArrayLike, n: int) -> IntArray:

@@ -8,11 +8,11 @@ from ..core.vocabulary import FloatArray, IntArray
 from ..mesh.edges import count_edges, edge_keys
 from ..pipeline.remesh import remesh
 from .energies import volumes
-from .minimize import with_restored_volumes
 from .necks import cut_necks
 from .problem import CapillaryProblem, with_surface
+from .steps import with_restored_volumes
 
-__all__ = ["remeshed", "with_cut_necks", "without_crumbs"]
+__all__ = ["remeshed", "with_cut_necks", "without_crumbs", "without_parts"]
 
 # A component without wires and with less volume than this many cubed edge lengths is dropped.
 _CRUMB = 0.5
@@ -96,3 +96,17 @@ def without_crumbs(problem: CapillaryProblem, L: float) -> CapillaryProblem:
         return problem
     kept = ~is_crumb[part]
     return with_surface(problem, problem.V, problem.F[kept], body=problem.body[kept])
+
+
+def without_parts(problem: CapillaryProblem, names: IntArray) -> CapillaryProblem | None:
+    """Drop components, and their volumes with them; None if a wire holds one, or nothing were left."""
+    count, part = problem.components()
+    goes = np.isin(part, names)
+    if len(names) == count or problem.fixed[problem.F[goes]].any():
+        return None
+    kept, body, targets = problem.F[~goes], problem.body[~goes], problem.targets
+    if len(targets):
+        gone = np.bincount(problem.body[goes], volumes(problem.V[problem.F[goes]]), len(targets))
+        bodies, body = np.unique(body, return_inverse=True)
+        targets = (targets - gone)[bodies]
+    return with_surface(problem, problem.V, kept, body=body, targets=targets)

@@ -23,8 +23,9 @@ from ..errors import MeshFormatError, OptionError
 from ..files.disk import reason, write_file
 from ..mesh.edges import halfedge_ends
 from .errors import EvolverError
-from .minimize import METHODS, Minimum, StepCallback, measured, with_restored_volumes
+from .minimize import Minimum, StepCallback, measured
 from .problem import CapillaryProblem, as_problem, with_surface
+from .steps import with_restored_volumes
 
 __all__ = ["EvolverBackend", "read_dump", "write_fe"]
 
@@ -211,7 +212,7 @@ class EvolverBackend:
         """Minimise; see `minimize`. ``callback`` is called once, at the end."""
         as_problem(problem)
         tolerance = number(tol, "tol", above=0.0)
-        choice(method, "method", METHODS)
+        choice(method, "method", tuple(_EVOLVER_STEPS))
         most = _EVOLVER_STEPS[method] if steps is None else count(steps, "steps")
         if callback is not None:
             function(callback, "callback")

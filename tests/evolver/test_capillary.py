@@ -9,7 +9,8 @@ from data.shapes.films import catenoid, catenoid_area, cone
 from remeshvec import MeshInputError, OptionError, remesh
 from remeshvec.evolver import CapillaryProblem, minimize
 from remeshvec.evolver.energies import areas, gradients, hessian, potentials, volumes
-from remeshvec.evolver.minimize import _constrained, _normals
+from remeshvec.evolver.motions import find_motions
+from remeshvec.evolver.steps import METHODS, _constrained
 
 
 def soup(seed=0):
@@ -190,14 +191,15 @@ def test_shifts_make_indefinite_problems_go_down():
     energies = [problem.energy(), *(step["energy"] for step in found.history)]
     assert len(energies) > 2 and energies[-1] < energies[1] - 1e-3
     forces = problem.forces()
-    normal, area = _normals(problem)
-    free = np.flatnonzero(problem.free)
+    motions = find_motions(problem)
+    normal, area, free = motions.normal, motions.area, motions.vertex
+    assert motions.is_normal and np.array_equal(free, np.flatnonzero(problem.free))
     H = problem.hessian(normal[:, None], np.array([1.0]))[free][:, free]
     assert np.linalg.eigvalsh(H.toarray()).min() < 0
     G = np.einsum("gnx,nx->gn", forces.volume, normal)[:, free].T
     u = _constrained(
         sp.csc_array((H + H.T) / 2),
-        sp.diags_array(area[free]),
+        sp.diags_array(area),
         G,
         G[:, 0] * 0 + 1.0,
         np.zeros(1),
@@ -241,3 +243,88 @@ def test_bad_input():
     for options in ({"method": "lbfgs"}, {"tol": 0}, {"steps": 0}):
         with pytest.raises(OptionError):
             minimize(problem, **options)
+
+
+# --- lines ---------------------------------------------------------------------------------------
+
+
+def film_in_a_tetrahedron(n=3, middle=(0.1, -0.07, 0.05)):
+    """Six sheets from the edges of a tetrahedron of edge length 1 to a point, each face cut n times."""
+    corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 8**0.5
+    V = np.vstack([corners, [middle]])
+    F = np.array([(a, b, 4) for a in range(4) for b in range(a + 1, 4)])
+    for _ in range(n):
+        sides = np.sort(np.concatenate([F[:, [0, 1]], F[:, [1, 2]], F[:, [2, 0]]]), axis=1)
+        edges, which = np.unique(sides, axis=0, return_inverse=True)
+        ab, bc, ca = len(V) + which.reshape(3, -1)
+        a, b, c = F.T
+        V = np.vstack([V, V[edges].mean(axis=1)])
+        parts = (a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)
+        F = np.concatenate([np.stack(part, axis=1) for part in parts])
+    return V, F
+
+
+def test_lines_move_across_themselves_and_their_junction_anywhere():
+    V, F = film_in_a_tetrahedron(2)
+    motions = find_motions(CapillaryProblem(V, F))
+    count = np.bincount(motions.vertex, minlength=len(V))
+    on_wires = np.unique(CapillaryProblem(V, F).fixed_edges)
+    assert (count[on_wires] == 0).all()
+    assert count[4] == 3
+    ends = V[:4]
+    for v in np.flatnonzero(count == 2):
+        along = V[v] - V[4]
+        assert min(np.linalg.norm(np.cross(along, e - V[4])) for e in ends) < 1e-12
+        D = motions.direction[motions.vertex == v]
+        assert np.abs(D @ along).max() < 1e-12 and abs(D[0] @ D[1]) < 1e-12
+    assert (count == 2).sum() == 4 * 3  # three vertices inside each line
+    inside = np.setdiff1d(np.arange(len(V)), on_wires)
+    assert (count[inside] >= 1).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_films_with_lines_converge_in_every_component_or_say_that_they_do_not(method):
+    problem = CapillaryProblem(*film_in_a_tetrahedron())
+    found = minimize(problem, method, tol=1e-8)
+    force = np.abs(found.problem.forces().energy[problem.free]).max()
+    assert found.converged == (force < 1e-6)
+    if method != "newton":
+        assert found.converged
+        assert found.area == pytest.approx(3 * 2**0.5 / 4, rel=1e-12)
+
+
+@pytest.mark.parametrize("bond", [0.0, 2.0])
+def test_auto_needs_few_steps_where_newton_fails(bond):
+    V, F = zoo.disc(24)
+    problem = CapillaryProblem(*remesh(V, F, 0.08, boundary="fixed"), volume=1.0, density=bond)
+    problem.gravity[:] = (0.0, 0.0, -1.0)
+    found = minimize(problem, "auto", tol=1e-8)
+    assert found.converged and len(found.history) < 20
+
+
+# --- no equilibrium ------------------------------------------------------------------------------
+
+
+def hanging_drop(volume):
+    """Pinned at a ring of radius 1, Bond number 1; the largest volume is about 5.5."""
+    V, F = cone(48, -1.0)
+    V, F = remesh(V, F[:, ::-1], 0.2, boundary="fixed")
+    return CapillaryProblem(V, F, volume=volume, density=1.0, gravity=(0, 0, -1.0))
+
+
+@pytest.mark.parametrize("method", ["auto", "flow"])
+def test_a_drop_that_is_too_heavy_has_no_equilibrium(method):
+    held = minimize(hanging_drop(4.5), method, steps=400, tol=1e-3)
+    assert held.converged
+    found = minimize(hanging_drop(7.0), method)
+    assert not found.converged and len(found.history) < 60
+    assert found.stop.startswith("no equilibrium: component 0 of 1") and "gravity" in found.stop
+    assert np.isfinite(found.V).all()
+
+
+def test_arguments_that_have_no_answer():
+    V, F = zoo.icosphere(2)
+    with pytest.raises(OptionError, match="nothing holds the surface"):
+        minimize(CapillaryProblem(V, F))
+    with pytest.raises(OptionError, match="sign of what the faces enclose"):
+        CapillaryProblem(V, F, volume=-1.0)

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from data.shapes import nonmanifold
 from data.shapes.films import catenoid, catenoid_area, cone
-from remeshvec import OptionError, read_mesh
+from remeshvec import OptionError, read_mesh, remesh
 from remeshvec.evolver import CapillaryProblem, cut_necks, evolve, write_frames
 from remeshvec.evolver.reshape import remeshed
 
@@ -320,3 +320,30 @@ def test_a_small_volume_splits_only_with_remeshing():
     assert_manifold(done.minimum.F)
     stuck = evolve(problem, [16.0, 8.0], remeshing=False)
     assert stuck.history[-1]["components"] == 1
+
+
+def test_what_has_come_off_falls_out_and_the_rest_is_minimised():
+    V, F = cone(24, -0.5)
+    drop = remesh(V, F[:, ::-1], 0.3, boundary="fixed")
+    ball = remesh(*zoo.icosphere(2), 0.6)
+    W = np.vstack([drop.V, 0.4 * ball.V + [0, 0, -3]])
+    G = np.vstack([drop.F, ball.F + len(drop.V)])
+    load = {"density": 1.0, "gravity": (0, 0, -1.0)}
+    volume = 0.6 + CapillaryProblem(0.4 * ball.V, ball.F).total_volume()
+    both = CapillaryProblem(W, G, volume=volume, bodies="per_component", **load)
+    found = evolve(both, [0.3], frames=True)
+    assert "fell" in [frame.event for frame in found.frames]
+    assert found.minimum.converged and found.history[-1]["components"] == 1
+    mine = both.targets[both.body[0]]
+    expected = evolve(CapillaryProblem(drop.V, drop.F, volume=mine, **load), [0.3]).minimum
+    assert found.minimum.problem.total_volume() - both.volume_offset == pytest.approx(mine)
+    assert found.minimum.energy == pytest.approx(expected.energy, rel=0.01)
+
+
+def test_an_evolution_without_equilibrium_ends_and_says_so():
+    V, F = cone(48, -1.0)
+    V, F = remesh(V, F[:, ::-1], 0.2, boundary="fixed")
+    problem = CapillaryProblem(V, F, volume=7.0, density=1.0, gravity=(0, 0, -1.0))
+    found = evolve(problem, [0.25, 0.15])
+    assert found.minimum.stop.startswith("no equilibrium") and not found.minimum.converged
+    assert len(found.minimum.F) < 10_000
