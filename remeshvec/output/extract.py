@@ -217,12 +217,25 @@ def _weld_sheets(mesh: Mesh, featured: FeaturedReference) -> _Numbers:
     target = None
     if featured.on_non_manifold is not None:
         target = weld_vertices(mesh.X[:, :3], non_manifold_vertices(mesh, featured))
+    if target is not None:
+        _part_corners(mesh.origin.reshape(-1, 3), target)
     if target is None:
         return _Numbers(_NOTHING, _NOTHING, _NOTHING)
     vertices = np.flatnonzero(target == np.arange(len(target))).astype(np.int32)
     new = np.empty(len(target), np.int32)
     new[vertices] = np.arange(len(vertices), dtype=np.int32)
     return _Numbers(_NOTHING, vertices, new[target])
+
+
+def _part_corners(F: IndexArray, target: IntArray) -> None:
+    """Leave apart what lies in one place but belongs to one face, which would lose its corners."""
+    while True:
+        a, b, c = target[F].T
+        is_torn = (a == b) | (b == c) | (c == a)
+        if not is_torn.any():
+            return
+        corners = F[is_torn]
+        target[corners] = corners
 
 
 def _write_result(

@@ -46,6 +46,7 @@ MENDED = {
     31000002: "rings of noise turned over in the last moves, with no edge folded",
     31000298: "a face turned over where a vertex was put back and its birth was not",
     31000399: "a face turned over beside faces that had to stay",
+    91001419: "two copies of a place on sheets that meet, in one face",
 }
 
 
