@@ -227,7 +227,7 @@ def _weld_sheets(mesh: Mesh, featured: FeaturedReference) -> _Numbers:
     return _Numbers(_NOTHING, vertices, new[target])
 
 
-def _part_corners(F: IndexArray, target: IntArray) -> None:
+def _part_corners(F: NDArray[Any], target: NDArray[Any]) -> None:
     """Leave apart what lies in one place but belongs to one face, which would lose its corners."""
     while True:
         a, b, c = target[F].T

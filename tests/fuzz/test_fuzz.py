@@ -43,7 +43,6 @@ MENDED = {
     1000107: "needles cut one another's shorter edges",
     1000063: "a face without area at a pinched vertex",
     1000094: "a face turned over, with no options at all",
-    31000002: "rings of noise turned over in the last moves, with no edge folded",
     31000298: "a face turned over where a vertex was put back and its birth was not",
     31000399: "a face turned over beside faces that had to stay",
     91001419: "two copies of a place on sheets that meet, in one face",
