@@ -9,7 +9,7 @@ import os
 import statistics
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +24,9 @@ from ..files.data_files import check_data_writable, read_data, write_data
 from ..files.disk import check_writable, write_file
 from ..files.mesh_files import MeshFile
 from ..interop.mesh_data import carry
-from ..processes.pool import run_here, run_in_processes
+from ..processes.client import check_workers, connected, run_on_client
+from ..processes.pool import run_in_processes
+from ..processes.tasks import Outcome, run_here
 from .arguments import batch_parser, given_options, parse, target_length
 from .batch_files import FileJob, find_jobs, refuse_collisions
 from .batch_table import COLUMNS, MEASURES, ResultTable, Row, write_parquet
@@ -40,6 +42,7 @@ _NOT_OPTIONS = (
     "out",
     "format",
     "workers",
+    "scheduler",
     "timeout",
     "force",
     "table",
@@ -122,6 +125,10 @@ def _prepared(options: argparse.Namespace) -> _Batch:
 def _check_arguments(options: argparse.Namespace) -> None:
     if options.adaptive is None and (options.min_length or options.max_length):
         raise OptionError("--min-length and --max-length need --adaptive")
+    if options.scheduler is not None and options.timeout is not None:
+        raise OptionError(
+            "--timeout and --scheduler exclude each other: a client cannot end a task"
+        )
     if options.table and Path(options.table).suffix.lower() not in (".csv", ".parquet"):
         raise OptionError(f"--table {options.table}: the suffix must be .csv or .parquet")
     if _is_parquet(options):
@@ -185,6 +192,8 @@ def _run_jobs(todo: list[FileJob], batch: _Batch) -> None:
 
 
 def _outcomes(todo: list[FileJob], options: argparse.Namespace) -> Any:
+    if options.scheduler is not None:
+        return _on_cluster(todo, options)
     workers = options.workers or available_threads()
     if workers == 1 and options.timeout is None:
         return run_here(_remesh_file, todo, options)
@@ -193,6 +202,20 @@ def _outcomes(todo: list[FileJob], options: argparse.Namespace) -> Any:
         _remesh_file, todo, options, workers, False, options.timeout,
         None if options.timeout is None else warm_up,
     )  # fmt: skip
+
+
+def _on_cluster(todo: list[FileJob], options: argparse.Namespace) -> Iterator[Outcome]:
+    """Let the workers of a cluster do the jobs, once they are known to see the same files."""
+    if not todo:
+        return
+    jobs = [
+        job._replace(input=os.path.abspath(job.input), path=os.path.abspath(job.path))
+        for job in todo
+    ]
+    with connected(options.scheduler) as client:
+        inputs = [job.input for job in jobs if os.path.exists(job.input)]
+        check_workers(client, options.out, inputs[:1])
+        yield from run_on_client(_remesh_file, jobs, options, client, ordered=False)
 
 
 def _remesh_file(job: FileJob, options: argparse.Namespace) -> Row:
