@@ -10,6 +10,7 @@ import statistics
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +27,7 @@ from ..files.mesh_files import MeshFile
 from ..interop.mesh_data import carry
 from ..processes.client import check_workers, connected, run_on_client
 from ..processes.pool import run_in_processes
-from ..processes.tasks import Outcome, run_here
+from ..processes.tasks import run_here
 from .arguments import batch_parser, given_options, parse, target_length
 from .batch_files import FileJob, find_jobs, refuse_collisions
 from .batch_table import COLUMNS, MEASURES, ResultTable, Row, write_parquet
@@ -66,17 +67,18 @@ def run(options: argparse.Namespace) -> int:
     skipped = len(batch.current)
     if skipped and not options.quiet:
         print(f"{skipped:,} of {len(batch.jobs):,} meshes are done already", flush=True)
-    batch.table.open()
-    try:
-        _run_jobs(todo, batch)
-    finally:  # after an interrupt too: the table is complete, and the summary counts the missing meshes
-        batch.table.close()
-        summary = _summary(batch, skipped, time.perf_counter() - start)
-        write_file(_summary_file(options), (json.dumps(summary, indent=2) + "\n").encode())
-        if _is_parquet(options):
-            write_parquet(options.table, batch.table.in_order())
-        if not options.quiet:
-            _print(summary, options)
+    with _cluster(todo, options) as client:
+        batch.table.open()
+        try:
+            _run_jobs(todo, batch, client)
+        finally:  # after an interrupt too: the table is complete, the summary counts missing meshes
+            batch.table.close()
+            summary = _summary(batch, skipped, time.perf_counter() - start)
+            write_file(_summary_file(options), (json.dumps(summary, indent=2) + "\n").encode())
+            if _is_parquet(options):
+                write_parquet(options.table, batch.table.in_order())
+            if not options.quiet:
+                _print(summary, options)
     return EXIT_SOME_FAILED if summary["failed"] else 0
 
 
@@ -172,10 +174,10 @@ def _is_done(job: FileJob, batch: _Batch) -> bool:
 # -- the work -------------------------------------------------------------------------------------
 
 
-def _run_jobs(todo: list[FileJob], batch: _Batch) -> None:
+def _run_jobs(todo: list[FileJob], batch: _Batch, client: Any) -> None:
     """Run the remaining jobs; add every outcome to the table at once."""
     rows = [batch.fresh(job) for job in todo]  # now: a file that changes during the run is redone
-    outcomes: Any = _outcomes(todo, batch.options)
+    outcomes: Any = _outcomes(todo, batch.options, client)
     if not batch.options.quiet:
         outcomes = bar(outcomes, len(todo), lambda outcome: outcome.error is not None)
     try:
@@ -191,9 +193,25 @@ def _run_jobs(todo: list[FileJob], batch: _Batch) -> None:
         outcomes.close()
 
 
-def _outcomes(todo: list[FileJob], options: argparse.Namespace) -> Any:
-    if options.scheduler is not None:
-        return _on_cluster(todo, options)
+@contextmanager
+def _cluster(todo: list[FileJob], options: argparse.Namespace) -> Iterator[Any]:
+    """Connect with the cluster, if there is one, and see that its workers can do the jobs."""
+    if options.scheduler is None or not todo:
+        yield None
+        return
+    with connected(options.scheduler) as client:
+        seen = [path for job in todo if os.path.exists(path := os.path.abspath(job.input))]
+        check_workers(client, options.out, seen[:1])
+        yield client
+
+
+def _outcomes(todo: list[FileJob], options: argparse.Namespace, client: Any) -> Any:
+    if client is not None:
+        full = [
+            job._replace(input=os.path.abspath(job.input), path=os.path.abspath(job.path))
+            for job in todo
+        ]
+        return run_on_client(_remesh_file, full, options, client, ordered=False)
     workers = options.workers or available_threads()
     if workers == 1 and options.timeout is None:
         return run_here(_remesh_file, todo, options)
@@ -202,20 +220,6 @@ def _outcomes(todo: list[FileJob], options: argparse.Namespace) -> Any:
         _remesh_file, todo, options, workers, False, options.timeout,
         None if options.timeout is None else warm_up,
     )  # fmt: skip
-
-
-def _on_cluster(todo: list[FileJob], options: argparse.Namespace) -> Iterator[Outcome]:
-    """Let the workers of a cluster do the jobs, once they are known to see the same files."""
-    if not todo:
-        return
-    jobs = [
-        job._replace(input=os.path.abspath(job.input), path=os.path.abspath(job.path))
-        for job in todo
-    ]
-    with connected(options.scheduler) as client:
-        inputs = [job.input for job in jobs if os.path.exists(job.input)]
-        check_workers(client, options.out, inputs[:1])
-        yield from run_on_client(_remesh_file, jobs, options, client, ordered=False)
 
 
 def _remesh_file(job: FileJob, options: argparse.Namespace) -> Row:
