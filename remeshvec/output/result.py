@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -96,9 +97,8 @@ class RemeshResult:
         LightResult
             Shares its arrays with this result. Quality and defects are measured now.
         """
-        return LightResult(
-            to_numpy(self.V), to_numpy(self.F), self.face_labels, self.report.to_dict()
-        )
+        figures = json.loads(json.dumps(self.report.to_dict()))  # as a file would give them back
+        return LightResult(to_numpy(self.V), to_numpy(self.F), self.face_labels, figures)
 
     # -- where things lie -------------------------------------------------------------------
 

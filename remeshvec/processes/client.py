@@ -211,6 +211,8 @@ def work(setup: bytes, versions: Versions, message: bytes) -> bytes:
 def check_workers(client: Any, folder: str | None = None, files: Sequence[str] = ()) -> None:
     """Refuse workers of a Dask cluster that would give other results, or do not see the caller's files.
 
+    Waits for the first worker: one that a queue has yet to start.
+
     Workers of other clients are not asked beforehand: they cannot be addressed one by one. Those, and
     workers that come later, compare their versions with every task.
 
@@ -229,6 +231,7 @@ def check_workers(client: Any, folder: str | None = None, files: Sequence[str] =
     """
     if not _is_dask(client):
         return
+    client.wait_for_workers(1)
     with _probe(folder) as made:
         found = client.run(_state, [*made, *files], on_error="return")
         here = _state([*made, *files])
@@ -263,10 +266,8 @@ def _state(paths: Sequence[str]) -> tuple[Versions, list[str]]:
 
 def _why_not(state: Any, here: tuple[Versions, list[str]]) -> str:
     """Say what is wrong with a worker, in one line; nothing if all is well."""
-    if isinstance(
-        state, Exception
-    ):  # most often: it has no such package, or a version without this
-        return _said(state)
+    if isinstance(state, Exception):  # it has no such package, or a version without this
+        return f"it cannot use remeshvec {__version__} ({_said(state)})"
     versions, unseen = state
     reasons = [_difference(versions, here[0])]
     reasons += [f"it does not see {os.path.dirname(p)}, which must be shared" for p in unseen[:1]]
