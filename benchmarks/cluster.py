@@ -112,8 +112,10 @@ def _engine(name: str) -> Iterator[dict[str, Any]]:
     if name == "processes":
         yield {"workers": WORKERS}
         return
+    import dask
     from distributed import Client, LocalCluster
 
+    dask.config.set({"distributed.worker.profile.enabled": False})  # it keeps 50 kB per mesh
     with (
         LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=None) as cluster,
         Client(cluster) as client,
@@ -176,7 +178,8 @@ def _page(facts: dict[str, str], sizes: list[int], runs: dict[str, Any]) -> str:
         f"{median(sizes):,.0f}), made from {SHAPES} shapes with noise of their own, and "
         f"{len(HOSTILE)} that cannot be read, through `remesh_many(paths, store=...)`: read, remesh, "
         "measure, write. Two processes of the package, then two workers of a cluster on this machine, "
-        "one run each. After a third of the meshes one worker is killed."
+        "one run each. After a third of the meshes one worker is killed. Dask's own profiler is off: it "
+        "keeps what it sees for an hour."
     )
     return page(
         "Data sets on a cluster",

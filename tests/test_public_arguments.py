@@ -113,7 +113,7 @@ REMESH = {
     "n_vertices": NOT_COUNTS,
     "max_deviation": NOT_POSITIVE,
     "threads": NOT_COUNTS,
-    "max_faces": [*NOT_COUNTS, None],
+    "max_faces": [*NOT_COUNTS, None, 10**9],  # more than 32-bit indices hold
     "callback": NOT_FUNCTIONS,
     "return_result": [*NOT_FLAGS, True],  # True: arrays give the result anyway
 }  # fmt: skip
