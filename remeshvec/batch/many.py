@@ -17,7 +17,7 @@ from ..errors import BatchError, OptionError
 from ..files.disk import FilePath
 from ..files.mesh_files import MeshFile
 from ..input.options import OPTION_NAMES, RemeshKeywords
-from ..output.light import LIGHT_SUFFIX
+from ..output.light import LIGHT_SUFFIX, LightResult
 from ..output.result import RemeshResult
 from ..pipeline.job import Lengths
 from ..pipeline.remesh import remesh
@@ -191,7 +191,7 @@ def _made_folder(store: FilePath | None) -> str | None:
 
 def _iterator(items: Any) -> Iterator[Any]:
     """Iterate over many meshes, and refuse a single one."""
-    if isinstance(items, str | bytes | os.PathLike | MeshFile | RemeshResult):
+    if isinstance(items, str | bytes | os.PathLike | MeshFile | RemeshResult | LightResult):
         raise OptionError("items must be many meshes; put a single one into a list: [mesh]")
     try:
         return iter(items)

@@ -200,6 +200,8 @@ def _cluster(todo: list[FileJob], options: argparse.Namespace) -> Iterator[Any]:
         yield None
         return
     with connected(options.scheduler) as client:
+        if not (options.quiet or client.nthreads()):
+            print("waiting for a first worker", flush=True)
         seen = [path for job in todo if os.path.exists(path := os.path.abspath(job.input))]
         check_workers(client, options.out, seen[:1])
         yield client

@@ -27,6 +27,8 @@ from remeshvec import (
 )
 from remeshvec.processes.tasks import AHEAD
 
+distributed = pytest.importorskip("distributed")
+
 FAST = {"preset": "fast"}
 
 # -- remesh_many ----------------------------------------------------------------------------------
@@ -180,6 +182,16 @@ def test_a_folder_that_is_not_shared_is_refused(client, tmp_path):
         client.run(show, workers=[address])
     assert f"{address}: it does not see {tmp_path}" in str(caught.value)
     assert "\n" not in str(caught.value) and os.listdir(tmp_path) == []
+
+
+def test_the_call_waits_for_a_first_worker():
+    with (
+        distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as queue,
+        distributed.Client(queue) as client,
+    ):
+        threading.Timer(0.3, queue.scale, [1]).start()
+        found = list(remesh_many([zoo.grid(4, 4)] * 9, client=client))
+    assert [item.error for item in found] == 9 * [None]
 
 
 def test_arguments(client, tmp_path):
