@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from helpers.processes import PATIENCE
 
 from remeshvec import write_mesh
 from remeshvec.cli.command import main
+
+pytest.importorskip("distributed")
 
 NAMES = ["a/x.obj", "b/x.obj", "b/y.ply", "b/z.off"]
 
@@ -122,6 +125,6 @@ def test_arguments(capsys, monkeypatch):
         assert main([*words, address]) == 2
         said = capsys.readouterr().err
         assert said.count("\n") == 1 and f"no Dask scheduler answers at {address}" in said
-    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    monkeypatch.setitem(sys.modules, "distributed", None)
     assert main([*words, "tcp://127.0.0.1:1"]) == 2
     assert "remeshvec[cluster]" in capsys.readouterr().err
