@@ -108,8 +108,8 @@ def _page(facts: dict[str, str], name: str, found: dict[str, Any]) -> str:
         table(["stage", "peak", "after its last run"], rows),
         "Splits write the mesh anew, here first with more faces than either end, beside the old one and "
         "the copy from before the sweeps; relaxation has its sums. A result holds the reference with its "
-        "tree, from which births and maps are found. A call whose first result has flaws sweeps again, on "
-        "copies, and takes about twice as much.",
+        "tree, from which births and maps are found. A call whose first result has flaws sweeps again, "
+        "on copies, and takes about twice as much.",
     )
 
 
