@@ -117,7 +117,7 @@ def _engine(name: str) -> Iterator[dict[str, Any]]:
 
     dask.config.set({"distributed.worker.profile.enabled": False})  # it keeps 50 kB per mesh
     with (
-        LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=None) as cluster,
+        LocalCluster(n_workers=WORKERS, threads_per_worker=1, dashboard_address=":0") as cluster,
         Client(cluster) as client,
     ):
         yield {"client": client}

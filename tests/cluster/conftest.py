@@ -10,7 +10,7 @@ def cluster():
     distributed = pytest.importorskip("distributed")
     environment = {"PYTHONPATH": surroundings(ROOT / "tests")["PYTHONPATH"]}
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, env=environment
+        n_workers=2, threads_per_worker=1, dashboard_address=":0", env=environment
     ) as cluster:
         yield cluster
 

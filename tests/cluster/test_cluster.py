@@ -186,7 +186,7 @@ def test_a_folder_that_is_not_shared_is_refused(client, tmp_path):
 
 def test_the_call_waits_for_a_first_worker():
     with (
-        distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as queue,
+        distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as queue,
         distributed.Client(queue) as client,
     ):
         threading.Timer(0.3, queue.scale, [1]).start()
