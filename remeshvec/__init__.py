@@ -20,6 +20,7 @@ from .files.mesh_files import MeshFile, read_mesh, write_mesh
 from .measures.distance import SurfaceDistance, surface_distance
 from .measures.quality import Quality, quality
 from .output.defects import Defects
+from .output.light import LightResult
 from .output.report import Report
 from .output.result import RemeshResult
 from .pipeline.creases import find_creases
@@ -29,6 +30,7 @@ from .sizing.adaptive import Adaptive
 if TYPE_CHECKING:
     from .batch.many import BatchItem, remesh_many
     from .batch.one_file import remesh_file
+    from .batch.one_item import remesh_item
     from .html_page.page import html_report, show_html, write_html
     from .modelling.editing import Editor, deform
     from .modelling.fairing import fair
@@ -45,6 +47,7 @@ __all__ = [
     "EditedSurface",
     "Editor",
     "LaplacianSolver",
+    "LightResult",
     "MeshFile",
     "MeshFormatError",
     "MeshInputError",
@@ -68,6 +71,7 @@ __all__ = [
     "read_mesh",
     "remesh",
     "remesh_file",
+    "remesh_item",
     "remesh_many",
     "show_html",
     "smooth",
@@ -90,6 +94,7 @@ _LAZY = {
     "html_report": "html_page",
     "laplacian": "modelling.laplacians",
     "remesh_file": "batch.one_file",
+    "remesh_item": "batch.one_item",
     "remesh_many": "batch.many",
     "show_html": "html_page",
     "smooth": "modelling.smoothing",

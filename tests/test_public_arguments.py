@@ -34,6 +34,7 @@ import remeshvec
 from remeshvec import (
     Adaptive,
     BatchError,
+    LightResult,
     MeshFormatError,
     RemeshResult,
     RemeshvecError,
@@ -69,6 +70,7 @@ NOT_ANGLES = [*NOT_POSITIVE, 90, 91.0]
 NOT_RESULTS = [None, 3, MESH, "page"]
 NOT_MESHES = [None, 3, [V], {}, (V, None), (V, F + 9), (V[:, :2], F)]
 NOT_VALUES = [None, 3, [1.0], [[1], [2, 3]]]
+NOT_STORES = [value for value in NOT_PATHS if value is not None]
 NOT_TITLES = [None, 3, "ab", ("a",), ("a", "b", "c"), ("a", 3)]
 PAGE = {"title": NOT_TEXTS, "command": NOT_TEXTS, "up": NOT_WORDS}
 PICTURE = {
@@ -111,7 +113,7 @@ REMESH = {
     "n_vertices": NOT_COUNTS,
     "max_deviation": NOT_POSITIVE,
     "threads": NOT_COUNTS,
-    "max_faces": [*NOT_COUNTS, None],
+    "max_faces": [*NOT_COUNTS, None, 10**9],  # more than 32-bit indices hold
     "callback": NOT_FUNCTIONS,
     "return_result": [*NOT_FLAGS, True],  # True: arrays give the result anyway
 }  # fmt: skip
@@ -182,8 +184,23 @@ TABLE = {
             "ordered": NOT_FLAGS,
             "progress": NOT_FLAGS,
             "timeout": NOT_POSITIVE,
+            "client": [3, "tcp://127.0.0.1:8786", {}],
+            "store": [*NOT_STORES, "in.obj", "in.obj/out"],
         },
         lambda: {"items": [MESH], "workers": 1},
+    ),
+    remeshvec.remesh_item: Entry(
+        {
+            "mesh": [3, None, "absent.obj", [V], {}],  # of pairs, V and F are named
+            "L": NOT_LENGTHS,
+            "store": [*NOT_STORES, "absent", "absent/a.npz", "in.obj"],
+        },
+        lambda: {"mesh": MESH},
+    ),
+    RemeshResult.light: Entry({}, lambda: {"self": result()}),
+    LightResult.save: Entry(
+        {"path": [*NOT_PATHS, "", "absent/a.npz", "a.obj"]},
+        lambda: {"self": result().light(), "path": "a.npz"},
     ),
     RemeshResult.show: Entry(
         {"title": NOT_TEXTS, "up": NOT_WORDS}, lambda: {"self": result()}
@@ -242,7 +259,8 @@ def test_every_public_function_is_in_one_table(place):
         value = getattr(place, name)
         is_error = inspect.isclass(value) and issubclass(value, Exception)
         if callable(value) and not is_error and name not in records:
-            wanted = [value] if value is not RemeshResult else []  # only `remesh` makes results
+            is_result = value in (RemeshResult, LightResult)  # which only the library makes
+            wanted = [] if is_result else [value]
             wanted += public_methods(value) if inspect.isclass(value) else []
             for one in wanted:
                 assert sum(one in table for table in tables) == 1, one

@@ -1,10 +1,12 @@
-"""`remesh_many`: any number of meshes, one after another or in several processes."""
+"""`remesh_many`: any number of meshes, one after another, in several processes, or on a cluster."""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable, Iterator, Sized
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,12 +14,17 @@ import numpy as np
 from ..core import arguments
 from ..core.threads import available_threads
 from ..errors import BatchError, OptionError
-from ..files.mesh_files import MeshFile, read_mesh
+from ..files.disk import FilePath
+from ..files.mesh_files import MeshFile
 from ..input.options import OPTION_NAMES, RemeshKeywords
+from ..output.light import LIGHT_SUFFIX, LightResult
 from ..output.result import RemeshResult
 from ..pipeline.job import Lengths
 from ..pipeline.remesh import remesh
-from ..processes.pool import Outcome, run_here, run_in_processes
+from ..processes.client import check_client, check_workers, run_on_client
+from ..processes.pool import run_in_processes
+from ..processes.tasks import Outcome, run_here
+from .one_item import StoredItem, as_mesh, is_pair, remesh_any, remesh_to_file
 from .progress import bar
 
 if TYPE_CHECKING:
@@ -36,12 +43,14 @@ class BatchItem:
         Number of the item, counted from 0.
     name : str
         Path of the item, or a description.
-    result : RemeshResult, or None after an error
+    result : RemeshResult, or None after an error or with ``store``
         The return value of `remesh`.
     error : Exception, or None
         An error of `remesh` or `read_mesh`, or a `WorkerError`.
     seconds : float
         Time in the worker process, including reading.
+    path : str, or None
+        With ``store``, the file that holds the result; `LightResult.load` reads it.
     """
 
     index: int
@@ -49,6 +58,7 @@ class BatchItem:
     result: Any = field(repr=False)
     error: Exception | None
     seconds: float
+    path: str | None = None
 
 
 def remesh_many(
@@ -60,13 +70,15 @@ def remesh_many(
     ordered: bool = True,
     progress: bool = False,
     timeout: float | None = None,
+    client: Any = None,
+    store: FilePath | None = None,
     **options: Unpack[RemeshKeywords],
 ) -> Iterator[BatchItem]:
-    """Remesh many meshes, in several processes.
+    """Remesh many meshes, in several processes or on a cluster.
 
     Every result is the same, bit for bit, as that of a separate call. Items are taken when they are
     needed and results are not kept, so a generator can give any number of them. The processes end with
-    the iterator, also after ``close()`` or an interrupt.
+    the iterator, also after ``close()`` or an interrupt; those of a ``client`` are left to it.
 
     Parameters
     ----------
@@ -77,7 +89,9 @@ def remesh_many(
         Target edge length for all items, as in `remesh`.
     workers : int, optional
         Number of processes; by default as many as there are cores. With 1, everything runs in this
-        process. Each process uses its part of the cores for large meshes.
+        process. Each process uses its part of the cores for large meshes. With a ``client``, the number
+        of workers to keep busy: at most four items for each are on their way. By default the number of
+        threads of a Dask cluster, also while it grows.
     on_error : {"raise", "collect"}
         ``"raise"``: an item that fails for any reason ends the batch with an exception, even if its
         process dies. ``"collect"``: it becomes a `BatchItem` with an ``error``, and the
@@ -88,7 +102,16 @@ def remesh_many(
         Show progress on the error stream: a bar if the package rich is installed, lines otherwise.
     timeout : float, optional
         Seconds that one item may take. After that, its process is ended and the item fails. With a
-        timeout, even ``workers=1`` uses a process.
+        timeout, even ``workers=1`` uses a process. A client has no way to end a task, so the two exclude
+        each other.
+    client : dask.distributed.Client or executor, optional
+        Does the work instead of processes of this call: anything with ``submit(function, *args)`` whose
+        future has ``result()``. Its workers need the same versions of remeshvec, NumPy and Numba, and
+        see the files that items name.
+    store : str or path, optional
+        Folder that is made where it is missing. Workers write each result into a file of its own, as
+        `LightResult.save` does, named by the item's number; items come with a ``path`` in the place of a
+        ``result``.
     **options
         Options of `remesh`. Functions among them (``L``, ``callback``) run in the workers; those that a
         worker cannot import by name need the package cloudpickle.
@@ -105,7 +128,8 @@ def remesh_many(
     OptionError
         An argument is invalid, or cannot be sent to other processes.
     WorkerError
-        A process cannot be started.
+        A process cannot be started. With a client: workers have other versions, do not see ``store``, or
+        the client has ended.
 
     Examples
     --------
@@ -118,32 +142,56 @@ def remesh_many(
         workers = arguments.count(workers, "workers")
     if timeout is not None:
         timeout = arguments.number(timeout, "timeout", above=0.0, unit="seconds")
+    if client is not None:
+        check_client(client)
+        if timeout is not None:
+            raise OptionError("timeout and client exclude each other: a client cannot end a task")
     _check_names(options)
     meshes = _iterator(items)
     total = len(items) if isinstance(items, Sized) else None
-    workers = workers or available_threads()
-    is_here = workers == 1 and timeout is None
-    if total:
-        workers = min(workers, total)  # so that few large meshes get all cores
-    crew = _Crew(workers, is_here, ordered, timeout)
-    done = _with_names(meshes, {"L": L, **options}, crew)
+    crew = _Crew(workers, total, ordered, timeout, client)
+    done = _with_names(meshes, {"L": L, **options}, crew, _made_folder(store))
     if on_error == "raise":
         done = _raising(done)
     return bar(done, total, lambda item: item.error is not None) if progress else done
 
 
 class _Crew(NamedTuple):
-    """The processes that do the work, and their options."""
+    """Who does the work, and how."""
 
-    workers: int
-    is_here: bool  # in this process alone
+    workers: int | None  # as the caller says
+    total: int | None  # items, where their number is known
     ordered: bool
     timeout: float | None
+    client: Any
+
+    @property
+    def processes(self) -> int:
+        """Number of processes; few large meshes get all cores."""
+        return min(self.workers or available_threads(), self.total or sys.maxsize)
+
+    @property
+    def is_here(self) -> bool:
+        """Whether all runs in this process alone."""
+        wanted = self.workers or available_threads()
+        return wanted == 1 and self.timeout is None and self.client is None
+
+
+def _made_folder(store: FilePath | None) -> str | None:
+    """Return the full path of a folder, which is there."""
+    if store is None:
+        return None
+    folder = os.path.abspath(arguments.path(store, "store"))
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise OptionError(f"store: no folder {folder} can be made ({error.strerror})") from error
+    return folder
 
 
 def _iterator(items: Any) -> Iterator[Any]:
     """Iterate over many meshes, and refuse a single one."""
-    if isinstance(items, str | bytes | os.PathLike | MeshFile | RemeshResult):
+    if isinstance(items, str | bytes | os.PathLike | MeshFile | RemeshResult | LightResult):
         raise OptionError("items must be many meshes; put a single one into a list: [mesh]")
     try:
         return iter(items)
@@ -160,7 +208,9 @@ def _check_names(options: Iterable[str]) -> None:
         raise OptionError(f"there is no option {', '.join(unknown)}")
 
 
-def _with_names(items: Iterator[Any], options: dict[str, Any], crew: _Crew) -> Iterator[BatchItem]:
+def _with_names(
+    items: Iterator[Any], options: dict[str, Any], crew: _Crew, store: str | None
+) -> Iterator[BatchItem]:
     """Remesh, and put back the names and arrays that the workers did not need.
 
     Items are copied: they wait for their worker while the caller makes the next one, perhaps in the same
@@ -170,29 +220,47 @@ def _with_names(items: Iterator[Any], options: dict[str, Any], crew: _Crew) -> I
 
     def tasks() -> Iterator[Any]:
         for index, item in enumerate(items):
-            mesh = _mesh_of(item)
+            mesh = as_mesh(item)
             name, arrays = _item_name(item), None
             del item
-            if _is_vertex_face_pair(mesh) and not crew.is_here:
+            if is_pair(mesh) and not crew.is_here:
                 mesh = arrays = tuple(x.copy() if isinstance(x, np.ndarray) else x for x in mesh)
-            held[index] = name, arrays
-            yield mesh
+            if isinstance(mesh, str) and crew.client is not None:
+                mesh = os.path.abspath(mesh)  # workers start elsewhere
+            held[index] = name, arrays if store is None else None
+            yield mesh if store is None else StoredItem(mesh, _file_name(store, index, mesh))
 
-    for outcome in _item_outcomes(tasks(), options, crew):
+    for outcome in _item_outcomes(tasks(), options, crew, store):
         name, arrays = held.pop(outcome.number)
         index, result, error, seconds = outcome
         del outcome
         if arrays is not None and isinstance(result, RemeshResult):
             result.report = replace(result.report, before=arrays)
-        yield BatchItem(index, name, result, error, seconds)
+        if store is None:
+            yield BatchItem(index, name, result, error, seconds)
+        else:
+            yield BatchItem(index, name, None, error, seconds, path=result)
         del result, arrays
 
 
-def _item_outcomes(tasks: Iterator[Any], options: dict[str, Any], crew: _Crew) -> Iterator[Outcome]:
+def _file_name(store: str, index: int, mesh: Any) -> str:
+    """Name a result by the number of its item, and by its file for those who read it."""
+    stem = Path(mesh).stem if isinstance(mesh, str) else "mesh"
+    return os.path.join(store, f"{index:06}-{stem}{LIGHT_SUFFIX}")
+
+
+def _item_outcomes(
+    tasks: Iterator[Any], options: dict[str, Any], crew: _Crew, store: str | None
+) -> Iterator[Outcome]:
+    """Let the crew work; without a store, results come back."""
     if crew.is_here:
-        return run_here(_remesh_here, tasks, options)
+        return run_here(remesh_any if store is None else remesh_to_file, tasks, options)
+    function: Any = _remesh_there if store is None else remesh_to_file
+    if crew.client is not None:
+        check_workers(crew.client, store)
+        return run_on_client(function, tasks, options, crew.client, crew.workers, crew.ordered)
     return run_in_processes(
-        _remesh_there, tasks, options, crew.workers, crew.ordered, crew.timeout,
+        function, tasks, options, crew.processes, crew.ordered, crew.timeout,
         None if crew.timeout is None else warm_up,
     )  # fmt: skip
 
@@ -213,24 +281,11 @@ def _raising(done: Iterator[BatchItem]) -> Iterator[BatchItem]:
         done.close()  # type: ignore[attr-defined]  # now, since the caller may keep the exception
 
 
-def _mesh_of(item: Any) -> Any:
-    """Return ``(V, F)``, a path, or an object that `remesh` has to read."""
-    if isinstance(item, MeshFile | RemeshResult):
-        return item.V, item.F
-    if isinstance(item, list) and len(item) == 2:
-        return tuple(item)
-    return os.fspath(item) if isinstance(item, os.PathLike) else item
-
-
-def _is_vertex_face_pair(mesh: Any) -> bool:
-    return isinstance(mesh, tuple) and len(mesh) == 2
-
-
 def _item_name(item: Any) -> str:
     if isinstance(item, str | os.PathLike):
         return os.fsdecode(item)
-    mesh = _mesh_of(item)
-    if not _is_vertex_face_pair(mesh):
+    mesh = as_mesh(item)
+    if not is_pair(mesh):
         return f"an object of type {type(item).__name__}"
     try:
         return f"{len(mesh[0]):,} vertices, {len(mesh[1]):,} faces"
@@ -238,20 +293,10 @@ def _item_name(item: Any) -> str:
         return "a pair of objects that are not arrays"
 
 
-def _remesh_here(mesh: Any, options: dict[str, Any]) -> Any:
-    """Remesh one item of any kind."""
-    if isinstance(mesh, str):
-        mesh = read_mesh(mesh)[:2]
-    if _is_vertex_face_pair(mesh):
-        return remesh(*mesh, **options)
-    call: Any = remesh
-    return call(mesh, **options)
-
-
 def _remesh_there(mesh: Any, options: dict[str, Any]) -> Any:
     """Remesh one item; do not send arrays of the caller back to it."""
-    result = _remesh_here(mesh, options)
-    if _is_vertex_face_pair(mesh) and isinstance(result, RemeshResult):
+    result = remesh_any(mesh, options)
+    if is_pair(mesh) and isinstance(result, RemeshResult):
         result.report = replace(result.report, before=((), ()))
     return result
 

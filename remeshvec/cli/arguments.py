@@ -38,6 +38,7 @@ BATCH_EPILOG = """\
 examples:
   remeshvec batch 'in/*.obj' --out even                 all OBJ files of a folder
   remeshvec batch 'in/**/*.stl' --out even --format ply --table even.parquet
+  remeshvec batch 'in/*.obj' --out even --scheduler tcp://10.0.0.1:8786
 
 Run the same command again to continue after an interrupt. It repeats meshes that failed, and those made
 from another input or with other options.
@@ -103,8 +104,14 @@ def batch_parser() -> argparse.ArgumentParser:
         choices=[suffix[1:] for suffix in COMMON_SUFFIXES],
         help="format to write (default: that of each input)",
     )
-    result.add_argument(
+    crew = result.add_mutually_exclusive_group()
+    crew.add_argument(
         "--workers", type=_at_least_one, metavar="N", help="meshes at a time (default: all cores)"
+    )
+    crew.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="let the workers of a Dask cluster do it, which see the same files: tcp://HOST:8786",
     )
     result.add_argument(
         "--timeout",

@@ -9,7 +9,8 @@ import os
 import statistics
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +25,9 @@ from ..files.data_files import check_data_writable, read_data, write_data
 from ..files.disk import check_writable, write_file
 from ..files.mesh_files import MeshFile
 from ..interop.mesh_data import carry
-from ..processes.pool import run_here, run_in_processes
+from ..processes.client import check_workers, connected, run_on_client
+from ..processes.pool import run_in_processes
+from ..processes.tasks import run_here
 from .arguments import batch_parser, given_options, parse, target_length
 from .batch_files import FileJob, find_jobs, refuse_collisions
 from .batch_table import COLUMNS, MEASURES, ResultTable, Row, write_parquet
@@ -40,6 +43,7 @@ _NOT_OPTIONS = (
     "out",
     "format",
     "workers",
+    "scheduler",
     "timeout",
     "force",
     "table",
@@ -63,17 +67,18 @@ def run(options: argparse.Namespace) -> int:
     skipped = len(batch.current)
     if skipped and not options.quiet:
         print(f"{skipped:,} of {len(batch.jobs):,} meshes are done already", flush=True)
-    batch.table.open()
-    try:
-        _run_jobs(todo, batch)
-    finally:  # after an interrupt too: the table is complete, and the summary counts the missing meshes
-        batch.table.close()
-        summary = _summary(batch, skipped, time.perf_counter() - start)
-        write_file(_summary_file(options), (json.dumps(summary, indent=2) + "\n").encode())
-        if _is_parquet(options):
-            write_parquet(options.table, batch.table.in_order())
-        if not options.quiet:
-            _print(summary, options)
+    with _cluster(todo, options) as client:
+        batch.table.open()
+        try:
+            _run_jobs(todo, batch, client)
+        finally:  # after an interrupt too: the table is complete, the summary counts missing meshes
+            batch.table.close()
+            summary = _summary(batch, skipped, time.perf_counter() - start)
+            write_file(_summary_file(options), (json.dumps(summary, indent=2) + "\n").encode())
+            if _is_parquet(options):
+                write_parquet(options.table, batch.table.in_order())
+            if not options.quiet:
+                _print(summary, options)
     return EXIT_SOME_FAILED if summary["failed"] else 0
 
 
@@ -122,6 +127,10 @@ def _prepared(options: argparse.Namespace) -> _Batch:
 def _check_arguments(options: argparse.Namespace) -> None:
     if options.adaptive is None and (options.min_length or options.max_length):
         raise OptionError("--min-length and --max-length need --adaptive")
+    if options.scheduler is not None and options.timeout is not None:
+        raise OptionError(
+            "--timeout and --scheduler exclude each other: a client cannot end a task"
+        )
     if options.table and Path(options.table).suffix.lower() not in (".csv", ".parquet"):
         raise OptionError(f"--table {options.table}: the suffix must be .csv or .parquet")
     if _is_parquet(options):
@@ -165,10 +174,10 @@ def _is_done(job: FileJob, batch: _Batch) -> bool:
 # -- the work -------------------------------------------------------------------------------------
 
 
-def _run_jobs(todo: list[FileJob], batch: _Batch) -> None:
+def _run_jobs(todo: list[FileJob], batch: _Batch, client: Any) -> None:
     """Run the remaining jobs; add every outcome to the table at once."""
     rows = [batch.fresh(job) for job in todo]  # now: a file that changes during the run is redone
-    outcomes: Any = _outcomes(todo, batch.options)
+    outcomes: Any = _outcomes(todo, batch.options, client)
     if not batch.options.quiet:
         outcomes = bar(outcomes, len(todo), lambda outcome: outcome.error is not None)
     try:
@@ -184,7 +193,27 @@ def _run_jobs(todo: list[FileJob], batch: _Batch) -> None:
         outcomes.close()
 
 
-def _outcomes(todo: list[FileJob], options: argparse.Namespace) -> Any:
+@contextmanager
+def _cluster(todo: list[FileJob], options: argparse.Namespace) -> Iterator[Any]:
+    """Connect with the cluster, if there is one, and see that its workers can do the jobs."""
+    if options.scheduler is None or not todo:
+        yield None
+        return
+    with connected(options.scheduler) as client:
+        if not (options.quiet or client.nthreads()):
+            print("waiting for a first worker", flush=True)
+        seen = [path for job in todo if os.path.exists(path := os.path.abspath(job.input))]
+        check_workers(client, options.out, seen[:1])
+        yield client
+
+
+def _outcomes(todo: list[FileJob], options: argparse.Namespace, client: Any) -> Any:
+    if client is not None:
+        full = [
+            job._replace(input=os.path.abspath(job.input), path=os.path.abspath(job.path))
+            for job in todo
+        ]
+        return run_on_client(_remesh_file, full, options, client, ordered=False)
     workers = options.workers or available_threads()
     if workers == 1 and options.timeout is None:
         return run_here(_remesh_file, todo, options)

@@ -60,7 +60,7 @@ class _RangeVertices(NamedTuple):
     """The vertices that each range of faces uses."""
 
     number: IndexArray  # (ranges, n), from 1 in the order of first use, 0 for none
-    listed: IndexArray  # (ranges, n), in this order
+    listed: IndexArray  # (3 m,) in this order, those of a range from its first corner on
     size: IntArray  # (ranges,)
 
 
@@ -101,7 +101,7 @@ def order_mesh(
     faces, face_source = np.empty((len(F), 3), np.int32), np.empty(len(F), np.int32)
     X, vertex_source = np.empty((n, 4)), np.empty(n, np.int32)
     vertices = _RangeVertices(
-        np.zeros((ranges, n), np.int32), np.empty((ranges, n), np.int32), np.empty(ranges, np.int64)
+        np.zeros((ranges, n), np.int32), np.empty(F.size, np.int32), np.empty(ranges, np.int64)
     )
     _number_vertices(parallel, cuts, F, keys, index_bits, vertices, faces, face_source)
     owned = vertices.size
@@ -243,12 +243,13 @@ def _number_vertices(span, cuts, F, keys, index_bits, vertices, faces, face_sour
             face_source[i] = f
             faces[i, 0], faces[i, 1], faces[i, 2] = F[f, 0], F[f, 1], F[f, 2]
         # In a loop of its own, so that the unpredictable branch below does not wait for distant memory.
+        first = 3 * cuts[k]
         count = 0
         for i in range(cuts[k], cuts[k + 1]):
             for c in range(3):
                 v = faces[i, c]
                 if numbers[k, v] == 0:
-                    listed[k, count] = v
+                    listed[first + count] = v
                     count += 1
                     numbers[k, v] = count
                 faces[i, c] = numbers[k, v] - 1
@@ -261,11 +262,12 @@ def _claim_vertices(span, cuts, vertices, owned):
     numbers, listed = vertices.number, vertices.listed
     for k in range(span[0], span[1]):
         owned[k] = vertices.size[k]
-        for s in range(vertices.size[k]):
-            v = listed[k, s]
+        first = 3 * cuts[k]
+        for s in range(first, first + vertices.size[k]):
+            v = listed[s]
             for j in range(k):
                 if numbers[j, v] > 0:
-                    listed[k, s] = -1 - v
+                    listed[s] = -1 - v
                     owned[k] -= 1
                     break
 
@@ -277,8 +279,9 @@ def _place_vertices(span, cuts, V, frame, vertices, starts, X, vertex_source):
     centre, scale = frame.centre, frame.scale
     for k in range(span[0], span[1]):
         i = starts[k]
-        for s in range(vertices.size[k]):
-            v = np.int64(listed[k, s])
+        first = 3 * cuts[k]
+        for s in range(first, first + vertices.size[k]):
+            v = np.int64(listed[s])
             if v >= 0:
                 vertex_source[i] = v
                 X[i, 0] = (V[v, 0] - centre[0]) * scale
@@ -294,13 +297,14 @@ def _renumber_corners(span, cuts, vertices, faces):
     """Give the corners of a range the numbers that count through all ranges."""
     numbers, listed = vertices.number, vertices.listed
     for k in range(max(1, span[0]), span[1]):
-        for s in range(vertices.size[k]):
-            v = np.int64(listed[k, s])
+        first = 3 * cuts[k]
+        for s in range(first, first + vertices.size[k]):
+            v = np.int64(listed[s])
             v = v if v >= 0 else -1 - v
             j = 0
             while numbers[j, v] == 0:
                 j += 1
-            listed[k, s] = numbers[j, v] - 1
+            listed[s] = numbers[j, v] - 1
         for i in range(cuts[k], cuts[k + 1]):
             for c in range(3):
-                faces[i, c] = listed[k, faces[i, c]]
+                faces[i, c] = listed[first + faces[i, c]]

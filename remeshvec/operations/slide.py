@@ -37,7 +37,7 @@ def slide_vertices(mesh: Mesh, blocks: Blocks, reference: Reference, parallel: b
 @threaded(per_block)
 def _find_arcs(span, mesh, blocks, polylines, arc):
     """Compute the arc length at which each vertex lies on its curve."""
-    X, origin, _, arcs = polylines
+    X, origin, row, _, arcs = polylines
     for k in range(span[0], span[1]):
         for v in range(blocks.vertex[k], blocks.vertex[k + 1]):
             if mesh.vertex_halfedge[v] == DEAD or mesh.kind[v] < CURVE or mesh.kind[v] == FIXED:
@@ -51,7 +51,8 @@ def _find_arcs(span, mesh, blocks, polylines, arc):
                 along += direction * (mesh.X[v, i] - X[a, i])
                 length += direction * direction
             s = along / length if length > 0.0 else 0.0
-            arc[v] = arcs[0, h] + s * (arcs[1, h] - arcs[0, h])
+            here = row[h]
+            arc[v] = arcs[0, here] + s * (arcs[1, here] - arcs[0, here])
 
 
 @threaded(per_block)
@@ -65,7 +66,7 @@ def _slide(span, mesh, blocks, polylines, arc):
             if u == NONE:
                 continue
             here = mesh.birth[v]
-            step = _slide_step(mesh, arc, v, u, w, polylines.arcs[2, here])
+            step = _slide_step(mesh, arc, v, u, w, polylines.arcs[2, polylines.row[here]])
             h, s = move_on_curve(polylines, here, arc[v] + SLIDE_SHARE * step)
             place_on_edge(mesh, v, polylines, h, s)
 

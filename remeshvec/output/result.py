@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from ..core.arguments import choice
 from ..core.lazy import Lazy, LazyRecipe
 from ..core.vocabulary import FloatArray, IntArray
+from .light import LightResult
 from .records import Births
 from .report import Report
 from .transfer import TRANSFER_METHODS, as_matrix, as_values, interpolate, pick, to_numpy
@@ -83,6 +85,20 @@ class RemeshResult:
         from ..html_page import show_html
 
         show_html(self, title=title, up=up)
+
+    def light(self) -> LightResult:
+        """Return the arrays, labels and figures, without what connects them with the input.
+
+        A pickled result also holds the last mesh and the reference, from which births, maps and transfers
+        are made: about six times its arrays. This is what to send, to keep or to save.
+
+        Returns
+        -------
+        LightResult
+            Shares its arrays with this result. Quality and defects are measured now.
+        """
+        figures = json.loads(json.dumps(self.report.to_dict()))  # as a file would give them back
+        return LightResult(to_numpy(self.V), to_numpy(self.F), self.face_labels, figures)
 
     # -- where things lie -------------------------------------------------------------------
 

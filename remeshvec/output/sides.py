@@ -131,9 +131,8 @@ def _curves(p: Provenance) -> IntArray:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    size, neighbours = p.reference.origin.size, p.reference.curve_neighbours
-    names = np.unique(p.names)
-    ends = neighbours[:, names] if len(names) else np.empty((2, 0), np.int64)
+    size, names = p.reference.origin.size, np.unique(p.names)
+    ends = p.reference.curve_neighbours[:, 1:]  # in the order of the names
     side, at = np.nonzero(ends != NONE)
     pairs = names[at], ends[side, at]
     graph = coo_array((np.ones(len(at), np.int8), pairs), shape=(size, size))

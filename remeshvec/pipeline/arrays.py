@@ -81,7 +81,8 @@ def read_sizing(L: Any, options: RemeshOptions) -> tuple[Sizing, tuple[str, int]
         function(options.callback, "callback")
     wanted = _wanted_count(L, options)
     gradation = check_gradation(options.gradation)
-    return Sizing(L, gradation, count(options.max_faces, "max_faces")), wanted
+    max_faces = count(options.max_faces, "max_faces", high=LARGEST_MESH)
+    return Sizing(L, gradation, max_faces), wanted
 
 
 def _check_number(n: int, m: int) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.vocabulary import EQUILATERAL_AREA, LARGEST_MESH, FloatArray, Mesh
@@ -161,8 +162,8 @@ class Job:
         monitor = self.monitor
         with monitor.watch.time("reference"):
             featured, length = self._build_reference(meshes[0], L)
-        before = meshes[0].copy()
-        swept = self._without_flaws(meshes.pop(), before, featured)
+        before = _shared_copy(meshes[0], featured)
+        swept = self._without_flaws(meshes, before, featured)
         work, stop, n_flaws = swept.work, swept.stop, swept.n_flaws
         is_compact = has_finish(work)
         deviation = deviation_of(work)
@@ -179,9 +180,11 @@ class Job:
             missed,
         )
 
-    def _without_flaws(self, mesh: Mesh, before: Mesh, featured: FeaturedReference) -> Swept:
+    def _without_flaws(
+        self, meshes: list[Mesh], before: Mesh, featured: FeaturedReference
+    ) -> Swept:
         """Sweep over a mesh, with care where that makes flaws: most meshes are done after one look."""
-        best = self._swept(mesh, before, featured, ())
+        best = self._swept(meshes, before, featured, ())
         if not self.monitor.is_cancelled:
             if best.n_flaws == 0 and has_crossings_at_curves(best.work.mesh, self.parallel):
                 best = self._judged(best, before)
@@ -208,7 +211,7 @@ class Job:
         for checks in guards[self.recipe.avoid_intersections or not has_folds :]:
             if not (best.n_flaws or best.n_crossings) or self.monitor.is_cancelled:
                 break
-            other = self._judged(self._swept(before.copy(), before, featured, checks), before)
+            other = self._judged(self._swept([before.copy()], before, featured, checks), before)
             if not self.monitor.is_cancelled:
                 best = min(best, other, key=lambda swept: (swept.n_flaws, swept.n_crossings))
         return best
@@ -235,11 +238,15 @@ class Job:
         return count_new_flaws(before, work.mesh, tree, crossings, self.parallel)
 
     def _swept(
-        self, mesh: Mesh, before: Mesh, featured: FeaturedReference, checks: tuple[Check, ...]
+        self,
+        meshes: list[Mesh],
+        before: Mesh,
+        featured: FeaturedReference,
+        checks: tuple[Check, ...],
     ) -> Swept:
-        """Sweep over a mesh and finish it, with a guard that makes these checks."""
+        """Sweep over the mesh in a list and finish it, with a guard that makes these checks."""
         self.monitor.counts = []
-        work = Work(mesh, featured, self.plan, self.monitor, self.may_run_parallel)
+        work = Work(meshes.pop(), featured, self.plan, self.monitor, self.may_run_parallel)
         bound = self.plan.max_deviation
         if bound is not None:
             checks = (*checks, DeviationCheck(featured, bound, work.is_parallel))
@@ -282,6 +289,15 @@ class Job:
             self.recipe.max_deviation,
         )
         return marks, length
+
+
+def _shared_copy(mesh: Mesh, featured: FeaturedReference) -> Mesh:
+    """Copy a mesh that sweeps will change, but for what the reference holds already: 28 bytes a face."""
+    reference = featured.reference
+    is_same = np.array_equal(reference.X[:, 3], mesh.X[:, 3])  # not where long rims raise lengths
+    X = reference.X if is_same else mesh.X.copy()
+    kept = mesh._replace(origin=reference.origin[:0], X=X[:0]).copy()
+    return kept._replace(origin=reference.origin, X=X)
 
 
 def _most_faces(allowed: int) -> int:

@@ -157,7 +157,8 @@ def remesh(
         than ``tol * L`` (root mean square). By default all sweeps are run.
     max_faces : int
         An ``L`` that would give more faces than this is refused: before any work where the area says
-        so, else before the splits that lead too far, or at the end.
+        so, else before the splits that lead too far, or at the end. At most 357,913,941, which is what
+        32-bit indices hold.
     threads : int, optional
         Threads to use at most; all by default. Meshes below 50,000 faces use one.
     callback : callable, optional

@@ -1,1 +1,1 @@
-"""Worker processes that do one task after another, and survive each other's deaths."""
+"""Worker processes that do one task after another, here or behind a client of a cluster."""

@@ -18,17 +18,14 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from time import monotonic, perf_counter
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 from ..core.threads import available_threads
 from ..errors import OptionError, WorkerError
-from .worker import END_PATIENCE, attempt, receive, send
+from .tasks import AHEAD, Outcome, collect, packed, packed_setup
+from .worker import END_PATIENCE, receive, send
 
-__all__ = ["Outcome", "StandingWorker", "run_here", "run_in_processes", "start_process"]
-
-# Tasks per worker that are taken but not yet handed on: one at work, and some that wait for the worker
-# or, where outcomes keep their order, for an earlier task. Sizes of meshes differ by a factor of twenty.
-AHEAD = 4
+__all__ = ["StandingWorker", "run_in_processes", "start_process"]
 
 _STARTS = 3  # attempts to start a worker
 _IDLE = 30.0  # seconds after which a standing worker is let go
@@ -37,24 +34,6 @@ _START = (
     "import pickle, sys; sys.path[:] = pickle.load(sys.stdin.buffer); "
     "from remeshvec.processes.worker import serve; serve()"
 )
-
-
-class Outcome(NamedTuple):
-    """Value or error of one task."""
-
-    number: int  # of the task, counted from 0
-    value: Any  # None where there is an error
-    error: Exception | None
-    seconds: float
-
-
-def run_here(function: Callable[..., Any], tasks: Iterable[Any], common: Any) -> Iterator[Outcome]:
-    """Do tasks one by one in this process; take each task only when its outcome is asked for."""
-    for index, task in enumerate(tasks):
-        outcome = Outcome(index, *attempt(function, task, common))
-        task = None  # an error keeps the frames that led to it, with their variables
-        yield outcome
-        del outcome
 
 
 def run_in_processes(
@@ -97,9 +76,9 @@ def run_in_processes(
     WorkerError
         A worker cannot be started.
     """
-    pool = _Pool(_setup(function, common, warm_up), workers, timeout)
+    pool = _Pool(packed_setup(function, common, warm_up), workers, timeout)
     try:
-        yield from _collect(pool, iter(tasks), AHEAD * workers, ordered)
+        yield from collect(pool, iter(tasks), ordered)
     finally:
         pool.stop()
 
@@ -134,10 +113,10 @@ class StandingWorker:
             if self._timer is not None:
                 self._timer.cancel()
             if self._pool is None:
-                self._pool = _Pool(_setup(self._function, None, None), 1, timeout)
+                self._pool = _Pool(packed_setup(self._function, None, None), 1, timeout)
             self._pool.timeout = timeout
             try:
-                self._pool.tasks.put((0, task))
+                self._pool.hand(0, task)
                 outcome = self._pool.answer()
             except BaseException:  # the answer would be taken for that of the next call
                 self._end()
@@ -160,65 +139,12 @@ class StandingWorker:
             self._pool = None
 
 
-def _collect(pool: _Pool, tasks: Iterator[Any], most: int, ordered: bool) -> Iterator[Outcome]:
-    """Keep the pool busy, and yield outcomes in order or as they come."""
-    waiting: dict[int, Outcome] = {}
-    given = done = 0  # tasks handed out, outcomes yielded
-    more = True
-    while True:
-        while more and given - done < most:
-            try:
-                task = next(tasks)
-            except StopIteration:
-                more = False
-                break
-            pool.tasks.put((given, task))
-            given += 1
-            task = None  # do not keep the caller's arrays alive
-        if done == given:
-            return
-        while not (done in waiting if ordered else waiting):
-            outcome = pool.answer()
-            waiting[outcome.number] = outcome
-        outcome = waiting.pop(done if ordered else next(iter(waiting)))
-        done += 1
-        yield outcome
-
-
-def _setup(*parts: Any) -> bytes:
-    try:
-        content = pickle.dumps(parts, 5)
-        if b"__main__" not in content:
-            return content
-    except Exception as error:
-        content = None
-        problem = error
-    content = _with_cloudpickle(parts) or content
-    if content is None:
-        raise OptionError(
-            f"an option cannot be sent to worker processes ({problem}); the package cloudpickle can send "
-            "functions, and workers=1 sends nothing"
-        ) from problem
-    return content
-
-
-def _with_cloudpickle(value: Any) -> bytes | None:
-    """Pickle also functions of scripts and lambdas, if cloudpickle is installed; None if that fails."""
-    try:
-        import cloudpickle
-    except ImportError:
-        return None
-    try:
-        return cloudpickle.dumps(value)
-    except Exception:
-        return None
-
-
 class _Pool:
     """The workers, and the threads that feed them."""
 
     def __init__(self, setup: bytes, count: int, timeout: float | None) -> None:
         self.setup, self.timeout = setup, timeout
+        self.room = AHEAD * count
         self.tasks: queue.SimpleQueue[tuple[int, Any] | None] = queue.SimpleQueue()
         self.workers: set[_Worker] = set()
         self.threads = max(1, available_threads() // count)
@@ -232,6 +158,10 @@ class _Pool:
         ]
         for feeder in self._feeders:
             feeder.start()
+
+    def hand(self, number: int, task: Any) -> None:
+        """Let the next worker that is free do a task."""
+        self.tasks.put((number, task))
 
     def answer(self) -> Outcome:
         """Return the next outcome, in any order."""
@@ -286,10 +216,9 @@ class _Pool:
     def _outcome(self, worker: _Worker, index: int, task: Any) -> Outcome:
         start = perf_counter()
         try:
-            message = pickle.dumps(task, 5)
-        except Exception as error:
-            reason = f"it cannot be sent to a worker process ({error}); workers=1 sends nothing"
-            return Outcome(index, None, WorkerError(reason), 0.0)
+            message = packed(task)
+        except WorkerError as error:
+            return Outcome(index, None, error, 0.0)
         try:
             return Outcome(index, *pickle.loads(worker.ask(message, self.timeout)))
         except WorkerError as error:

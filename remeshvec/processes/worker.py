@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 
 from ..errors import RemeshvecError, WorkerError
 
-__all__ = ["END_PATIENCE", "attempt", "receive", "send", "serve"]
+__all__ = ["END_PATIENCE", "answer", "attempt", "receive", "send", "serve"]
 
 END_PATIENCE = 5.0  # seconds that a process has to clean up before it is killed
 
@@ -91,11 +91,11 @@ def _work(messages: queue.SimpleQueue[bytes | None], target: BinaryIO) -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # KeyboardInterrupt
     send(target, pickle.dumps(None))
     while (message := messages.get()) is not None:
-        send(target, _answer(function, message, common))
+        send(target, answer(function, message, common))
         del message
 
 
-def _answer(function: Callable[..., Any], message: bytes, common: Any) -> bytes:
+def answer(function: Callable[..., Any], message: bytes, common: Any) -> bytes:
     """Do one task; return a pickled (value, error, seconds)."""
     start = perf_counter()
     try:

@@ -103,17 +103,18 @@ def build_reference(
         fixed = _agree_across_copies(fixed, vertex_source, on_non_manifold)
     feature_names = mesh.curve[curves.edges]
     counts["corners"] = int(np.count_nonzero(fixed & (curves.degree > 0)))
-    curve_neighbours = join_edges(mesh.curve, curves, origin, fixed)
+    row, neighbours = join_edges(mesh.curve, curves, origin, fixed)
     _mark(mesh, curves.edges, fixed)
     mesh.curve[members] += NON_MANIFOLD
     mesh.curve[marks.frozen] = FROZEN
     hold_tips(mesh, turns)
     X = mesh.X.copy()
-    arcs = measure_arcs(X, origin, names, curve_neighbours)
+    arcs = measure_arcs(X, origin, names, row, neighbours)
     if marks.held is not None:
         twin[_walls(twin, marks.held)] = NONE
     twin[curves.edges] = NONE
-    reference = Reference(Surface(X, origin, twin, parallel), X, origin, curve_neighbours, arcs)
+    surface = Surface(X, origin, twin, parallel)
+    reference = Reference(surface, X, origin, row, neighbours, arcs)
     long_rims = lengthen_rims(mesh, vertex_source, marks.frozen)
     return FeaturedReference(
         reference, on_non_manifold, marks.held, long_rims, curves.edges, feature_names, counts

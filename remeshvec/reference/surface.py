@@ -17,8 +17,9 @@ class Reference(NamedTuple):
     surface: Surface  # gets its tree when it is first projected onto
     X: FloatArray  # (n, 4), target lengths in the last column
     origin: IndexArray  # (3 m,)
-    curve_neighbours: IndexArray  # (2, 3 m), see `polyline.join_edges`
-    arcs: FloatArray  # (3, 3 m), see `polyline.measure_arcs`
+    curve_row: IndexArray  # (3 m,), see `polyline.join_edges`
+    curve_neighbours: IndexArray  # (2, 1 + j)
+    arcs: FloatArray  # (3, 1 + j), see `polyline.measure_arcs`
 
     @property
     def tree(self) -> Tree:
@@ -28,4 +29,4 @@ class Reference(NamedTuple):
     @property
     def polylines(self) -> Polylines:
         """The polylines of its feature curves, for kernels."""
-        return Polylines(self.X, self.origin, self.curve_neighbours, self.arcs)
+        return Polylines(self.X, self.origin, self.curve_row, self.curve_neighbours, self.arcs)

@@ -122,7 +122,7 @@ def test_unexpected_errors_say_where_they_come_from():
     assert isinstance(found[0].error, WorkerError) and found[1].error is None
     found = list(remesh_many([zoo.grid(4, 4)], lambda points: 1 / 0, workers=2, on_error="collect"))
     assert isinstance(found[0].error, ZeroDivisionError)
-    assert "_remesh_here" in "".join(found[0].error.__notes__)
+    assert "remesh_any" in "".join(found[0].error.__notes__)
 
 
 def test_workers_that_cannot_start(monkeypatch):

@@ -24,7 +24,7 @@ def query(polylines, start, P, found, parameter, squared):
 def closest(mesh, beside, start, P):
     """Edges, points and distances."""
     found, s, squared = np.empty(len(P), int), np.empty(len(P)), np.empty(len(P))
-    polylines = Polylines(mesh.X, mesh.origin, beside, np.empty((3, 0)))
+    polylines = Polylines(mesh.X, mesh.origin, *beside, np.empty((3, 0)))
     query(polylines, np.asarray(start, np.int64), P, found, s, squared)
     assert s.min() >= 0 and s.max() <= 1
     a = mesh.X[mesh.origin[found], :3]
@@ -38,7 +38,8 @@ def curves(V, F, length=1.0, **wanted):
     """Mesh, who follows whom on its curves, and the names of their edges."""
     mesh = built(V, F)
     reference = featured(mesh, length, **wanted).reference
-    return mesh, reference.curve_neighbours, np.unique(mesh.curve[mesh.curve >= 0])
+    beside = reference.curve_row, reference.curve_neighbours
+    return mesh, beside, np.unique(mesh.curve[mesh.curve >= 0])
 
 
 def distance_within_reach(mesh, names, start, p):
@@ -132,14 +133,16 @@ def test_the_smallest_loops_end(n):
     beside[0, edges], beside[1, edges] = np.roll(edges, 1), np.roll(edges, -1)
     P = np.random.default_rng(0).normal(scale=10, size=(20, 3))
     for start in edges:
-        found, _, distance = closest(mesh, beside, np.full(20, start), P)
+        row = np.arange(mesh.origin.size, dtype=np.int32)
+        found, _, distance = closest(mesh, (row, beside), np.full(20, start), P)
         assert np.isin(found, edges).all() and np.isfinite(distance).all()
 
 
 def test_without_curves_the_edge_itself_is_searched():
     mesh = built(*zoo.tetrahedron())
     P = np.random.default_rng(0).normal(size=(10, 3))
-    found, points, _ = closest(mesh, np.empty((2, 0), np.int32), np.full(10, 4), P)
+    none = np.empty(0, np.int32), np.empty((2, 0), np.int32)
+    found, points, _ = closest(mesh, none, np.full(10, 4), P)
     assert (found == 4).all()
     expected = [naive.closest_on_segment(p, *mesh.X[list(ends(mesh, 4)), :3]) for p in P]
     assert points == pytest.approx(np.array(expected))

@@ -182,8 +182,9 @@ def test_neighbours_share_an_end_that_is_no_corner(name, cornered):
     mesh, is_feature = features_of(name)
     names, edges = names_of(mesh, is_feature)
     corner = (mesh.kind == FIXED) & cornered
-    beside = join_edges(names, curves_of(mesh, is_feature), mesh.origin, corner)
-    assert beside.shape == (2, mesh.origin.size) and beside.dtype == np.int32
+    row, neighbours = join_edges(names, curves_of(mesh, is_feature), mesh.origin, corner)
+    assert neighbours.shape == (2, 1 + len(edges)) and neighbours.dtype == row.dtype == np.int32
+    beside = neighbours[:, row]
     assert (np.delete(beside, edges, axis=1) == NONE).all()
     at = defaultdict(set)  # on the sheet of the name: names at every vertex
     for h in np.flatnonzero(is_feature).tolist():
@@ -202,7 +203,9 @@ def test_without_curves_nobody_has_neighbours():
     names, edges = names_of(mesh, none)
     assert (names == NONE).all() and not len(edges)
     corner = np.zeros(len(mesh.X), bool)
-    assert join_edges(names, curves_of(mesh, none), mesh.origin, corner).shape == (2, 0)
+    row, neighbours = join_edges(names, curves_of(mesh, none), mesh.origin, corner)
+    assert row.shape == (0,) and neighbours.shape == (2, 0)
+    assert measure_arcs(mesh.X, mesh.origin, edges, row, neighbours).shape == (3, 0)
 
 
 # --- arcs ----------------------------------------------------------------------------------------
@@ -212,8 +215,17 @@ def arcs_of(mesh):
     """Names, who follows whom, and arc lengths of a mesh with marked features."""
     is_feature = mesh.curve != NONE
     names, edges = names_of(mesh, is_feature)
-    beside = join_edges(names, curves_of(mesh, is_feature), mesh.origin, mesh.kind == FIXED)
-    return edges, beside, measure_arcs(mesh.X, mesh.origin, edges, beside)
+    is_fixed = mesh.kind == FIXED
+    row, neighbours = join_edges(names, curves_of(mesh, is_feature), mesh.origin, is_fixed)
+    return edges, Polylines(
+        mesh.X, mesh.origin, row, neighbours,
+        measure_arcs(mesh.X, mesh.origin, edges, row, neighbours),
+    )  # fmt: skip
+
+
+def by_half_edge(polylines):
+    """Who follows whom, and arc lengths, for all half-edges."""
+    return polylines.neighbours[:, polylines.row], polylines.arcs[:, polylines.row]
 
 
 def chains(edges, beside):
@@ -233,8 +245,9 @@ def chains(edges, beside):
 def test_arcs_go_on_from_edge_to_edge(name):
     """From zero to the length of the curve, without a jump; closed ones meet their beginning."""
     mesh, _ = features_of(name)
-    edges, beside, arcs = arcs_of(mesh)
-    assert arcs.shape == (3, mesh.origin.size)
+    edges, polylines = arcs_of(mesh)
+    assert polylines.arcs.shape == (3, 1 + len(edges))
+    beside, arcs = by_half_edge(polylines)
     assert not np.delete(arcs, edges, axis=1).any()
     length = {h: naive.edge_length(mesh.X[:, :3], ends(mesh, h)) for h in edges.tolist()}
     for chain in chains(edges, beside):
@@ -265,7 +278,8 @@ def test_arcs_over_an_edge_of_no_length(k, seed):
     mesh = built(V, F)
     line = np.arange(1, 21, 3)
     featured(mesh, 1.0, feature_edges=np.stack([line[:-1], line[1:]], axis=1))
-    edges, _, arcs = arcs_of(mesh)
+    edges, polylines = arcs_of(mesh)
+    _, arcs = by_half_edge(polylines)
     found = {frozenset(ends(mesh, h)): np.sort(arcs[:2, h]).tolist() for h in edges.tolist()}
     spans = [found[frozenset(edge)] for edge in pairwise(line.tolist())]
     steps = [naive.edge_length(V, edge) for edge in pairwise(line)]
@@ -284,7 +298,8 @@ def test_arcs_around_a_loop_with_an_edge_of_no_length():
         V[30] = V[23]
         mesh = built(V, F)
         draw(mesh, loop)
-        edges, _, arcs = arcs_of(mesh)
+        edges, polylines = arcs_of(mesh)
+        _, arcs = by_half_edge(polylines)
         edges = [h for h in edges.tolist() if set(ends(mesh, h)) <= set(loop)]
         length = [naive.edge_length(V, ends(mesh, h)) for h in edges]
         assert abs(arcs[1, edges] - arcs[0, edges]) == pytest.approx(length)
@@ -301,14 +316,15 @@ def walk(polylines, edge, arc, found, parameter):
 def test_moves_end_at_the_arc_length(name):
     """From any edge of a curve; past its ends they stop there, around a closed one they go on."""
     mesh, _ = features_of(name)
-    edges, beside, arcs = arcs_of(mesh)
+    edges, polylines = arcs_of(mesh)
+    beside, arcs = by_half_edge(polylines)
     rng = np.random.default_rng(0)
     start = rng.choice(edges, 300).astype(np.int64)
     total = np.abs(arcs[2, start])
     closed = arcs[2, start] > 0
     wanted = rng.uniform(-0.9, 1.9, 300) * total
     found, s = np.empty(300, np.int64), np.empty(300)
-    walk(Polylines(mesh.X, mesh.origin, beside, arcs), start, wanted, found, s)
+    walk(polylines, start, wanted, found, s)
     at = arcs[0, found] + s * (arcs[1, found] - arcs[0, found])
     expected = np.where(closed, wanted % total, np.clip(wanted, 0, total))
     away = np.abs(at - expected)

@@ -306,13 +306,18 @@ def assert_on_reference(mesh: Mesh, reference: Reference) -> None:
     assert (mesh.kind[frozen_ends] == FIXED).all(), "a frozen edge with an end that may move"
 
 
+def curve_neighbours(reference: Reference) -> np.ndarray:
+    """Names of the neighbours at both ends of every half-edge that is a name, (2, 3 m)."""
+    return reference.curve_neighbours[:, reference.curve_row]
+
+
 def chains_of(reference: Reference) -> np.ndarray:
     """Equal numbers for edges of the same polyline, by their names."""
     h = np.arange(len(reference.origin))
     if not reference.curve_neighbours.shape[1]:
         return h
     pairs = np.array(
-        [(i, j) for side in reference.curve_neighbours for i, j in enumerate(side) if j != NONE]
+        [(i, j) for side in curve_neighbours(reference) for i, j in enumerate(side) if j != NONE]
     )
     graph = coo_matrix((np.ones(len(pairs)), pairs.reshape(-1, 2).T), shape=(len(h), len(h)))
     return connected_components(graph, directed=False)[1]

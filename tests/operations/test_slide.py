@@ -10,6 +10,7 @@ from helpers.structure import (
     built,
     copied,
     curve_edges,
+    curve_neighbours,
     cut_open,
     featured,
     next_of,
@@ -56,7 +57,7 @@ class Polyline:
     """One curve of the reference in order: its edges, its corners' places and their arc lengths."""
 
     def __init__(self, reference, names, start):
-        X, beside = reference.X[:, :3], reference.curve_neighbours
+        X, beside = reference.X[:, :3], curve_neighbours(reference)
         self.points, self.edges, self.closed = [], [], True
         v, h = int(reference.origin[start]), start
         for first in names:  # begin at an end if there is one
@@ -89,7 +90,8 @@ def polylines(mesh, reference):
     """Polyline of every name."""
     names = np.unique(mesh.curve[mesh.curve >= 0] & (NON_MANIFOLD - 1))
     found = {}
-    todo = set(np.flatnonzero(reference.arcs[2] != 0).tolist()) | set(names.tolist())
+    beside = curve_neighbours(reference)
+    todo = set(np.flatnonzero(reference.curve_row).tolist()) | set(names.tolist())
     while todo:
         group, stack = set(), [min(todo)]
         while stack:
@@ -97,7 +99,7 @@ def polylines(mesh, reference):
             if h in group:
                 continue
             group.add(h)
-            stack += [int(g) for g in reference.curve_neighbours[:, h] if g != NONE]
+            stack += [int(g) for g in beside[:, h] if g != NONE]
         todo -= group
         line = Polyline(reference, sorted(group), min(group))
         assert set(line.edges) == group

@@ -1,10 +1,12 @@
-"""Hundreds of calls of all kinds leave no memory behind."""
+"""Calls leave no memory behind, and take no more than they need."""
 
 import gc
 import os
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
+import pytest
 from helpers import zoo
 from helpers.processes import needs_proc
 
@@ -66,3 +68,22 @@ def grown(count):
 @needs_proc
 def test_memory_does_not_grow_over_hundreds_of_calls():
     assert grown(800) < 4e6
+
+
+@pytest.mark.parametrize(
+    ("mesh", "most"),
+    [(zoo.torus(200, 100), 500), (zoo.grid(140, 140), 480)],
+    ids=["closed", "with curves"],
+)
+def test_bytes_per_face_at_the_peak(mesh, most):
+    """450 and 416 when this was written; 563 and 1,089 with arrays that lived too long."""
+    V, F = mesh
+    remesh(*zoo.torus(20, 10))  # loads kernels
+    gc.collect()
+    tracemalloc.start()
+    try:
+        remesh(V, F)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < most * len(F)

@@ -8,6 +8,7 @@ from helpers.structure import (
     assert_valid,
     built,
     curve_edges,
+    curve_neighbours,
     cut_open,
     ends,
     featured,
@@ -199,7 +200,7 @@ def test_fixed_vertices_stay_wherever_they_are():
     assert_built(mesh, result)
     assert (mesh.kind[chosen] == FIXED).all()
     assert (mesh.kind == FIXED).sum() == 4 + 2 + 3
-    beside = result.reference.curve_neighbours
+    beside = curve_neighbours(result.reference)
     for a, b in ((5, 6), (6, 7)):
         name = curve_edges(mesh)[frozenset((at(4, a), at(4, b)))]
         side = [mesh.origin[name], mesh.origin[next_of(name)]].index(at(4, 6))
