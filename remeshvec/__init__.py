@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .batch.many import BatchItem, remesh_many
     from .batch.one_file import remesh_file
     from .html_page.page import html_report, show_html, write_html
+    from .modelling.denoising import denoise
     from .modelling.editing import Editor, deform
     from .modelling.fairing import fair
     from .modelling.laplacians import cotangent_matrix, laplacian, vertex_areas
@@ -60,6 +61,7 @@ __all__ = [
     "WorkerError",
     "cotangent_matrix",
     "deform",
+    "denoise",
     "fair",
     "find_creases",
     "html_report",
@@ -86,6 +88,7 @@ _LAZY = {
     "MultiresolutionEditor": "modelling.multiresolution",
     "cotangent_matrix": "modelling.laplacians",
     "deform": "modelling.editing",
+    "denoise": "modelling.denoising",
     "fair": "modelling.fairing",
     "html_report": "html_page",
     "laplacian": "modelling.laplacians",
