@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from .modelling.multiresolution import EditedSurface, MultiresolutionEditor
     from .modelling.smoothing import smooth
     from .modelling.solver import LaplacianSolver
+    from .scans.repair import repair
+    from .scans.report import RepairReport, RepairResult
 
 __all__ = [
     "Adaptive",
@@ -55,6 +57,8 @@ __all__ = [
     "RemeshResult",
     "RemeshWarning",
     "RemeshvecError",
+    "RepairReport",
+    "RepairResult",
     "Report",
     "SingularSystemError",
     "SurfaceDistance",
@@ -71,6 +75,7 @@ __all__ = [
     "remesh",
     "remesh_file",
     "remesh_many",
+    "repair",
     "show_html",
     "smooth",
     "surface_distance",
@@ -86,6 +91,8 @@ _LAZY = {
     "Editor": "modelling.editing",
     "LaplacianSolver": "modelling.solver",
     "MultiresolutionEditor": "modelling.multiresolution",
+    "RepairReport": "scans.report",
+    "RepairResult": "scans.report",
     "cotangent_matrix": "modelling.laplacians",
     "deform": "modelling.editing",
     "denoise": "modelling.denoising",
@@ -94,6 +101,7 @@ _LAZY = {
     "laplacian": "modelling.laplacians",
     "remesh_file": "batch.one_file",
     "remesh_many": "batch.many",
+    "repair": "scans.repair",
     "show_html": "html_page",
     "smooth": "modelling.smoothing",
     "vertex_areas": "modelling.laplacians",
