@@ -107,7 +107,7 @@ class _Surface:
         self.V_in = V
         self.F = F
         self.vertex_source: IntArray = np.arange(len(V))
-        self.face_source: IntArray = np.arange(len(F))
+        self.corner_source: IntArray = np.arange(F.size).reshape(-1, 3)
         self.done: dict[str, int] = {}
 
     @property
@@ -128,6 +128,7 @@ class _Surface:
     def orient(self) -> None:
         turned, flipped = orient_faces(self.F.astype(np.int32), len(self.V_in))
         self.F = turned.astype(np.int64)
+        self.corner_source[flipped] = self.corner_source[flipped][:, [0, 2, 1]]
         self.done["flipped_faces"] = int(flipped.sum())
 
     def part(self) -> None:
@@ -173,7 +174,7 @@ class _Surface:
         self.done["filled_holes"], self.done["holes_left"] = filled.closed, filled.left
         self.done["filling_faces"] = len(filled.F)
         self.F = np.concatenate([self.F, filled.F])
-        self.face_source = np.concatenate([self.face_source, np.full(len(filled.F), -1, np.int64)])
+        self.corner_source = np.concatenate([self.corner_source, np.full_like(filled.F, -1)])
 
     def turn(self) -> None:
         n, part = self._parts()
@@ -181,6 +182,7 @@ class _Surface:
         self.done["turned_components"] = int(turned.sum())
         inside_out = turned[part]
         self.F[inside_out] = self.F[inside_out][:, ::-1]
+        self.corner_source[inside_out] = self.corner_source[inside_out][:, ::-1]
 
     def result(self) -> RepairResult:
         used = np.unique(self.F)
@@ -190,7 +192,7 @@ class _Surface:
         number[used] = np.arange(len(used))
         source = self.vertex_source[used]
         return RepairResult(
-            self.V_in[source], number[self.F], source, self.face_source, RepairReport(**self.done)
+            self.V_in[source], number[self.F], source, self.corner_source, RepairReport(**self.done)
         )
 
     def _parts(self) -> tuple[int, IntArray]:
@@ -212,7 +214,7 @@ class _Surface:
             )
 
     def _keep(self, rows: IntArray) -> None:
-        self.F, self.face_source = self.F[rows], self.face_source[rows]
+        self.F, self.corner_source = self.F[rows], self.corner_source[rows]
 
 
 def _double_areas(V: FloatArray, F: IntArray) -> FloatArray:

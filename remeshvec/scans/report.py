@@ -49,6 +49,9 @@ class RepairResult:
         Faces; those that fill holes come last.
     vertex_source : (n,) int64
         Vertex of the input of every vertex.
+    corner_source : (m, 3) int64
+        Corner of the input of every corner, ``3 f + c`` for corner c of face f; -1 in faces that fill
+        holes.
     face_source : (m,) int64
         Face of the input of every face; -1 for those that fill holes.
     report : RepairReport
@@ -58,8 +61,13 @@ class RepairResult:
     V: FloatArray
     F: IntArray
     vertex_source: IntArray
-    face_source: IntArray
+    corner_source: IntArray
     report: RepairReport
+
+    @property
+    def face_source(self) -> IntArray:
+        """Face of the input of every face; -1 for those that fill holes."""
+        return self.corner_source[:, 0] // 3
 
     def __iter__(self) -> Iterator[Any]:
         return iter((self.V, self.F))

@@ -1,4 +1,4 @@
-"""The triangulation of a loop in space that bends least: dynamic programming over its chords."""
+"""A triangulation of a loop in space that bends little: dynamic programming over its chords."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ _IMPOSSIBLE = 2.0  # above the negative cosine of any bend
 def triangulate(P: FloatArray, outer: FloatArray, taken: BoolArray) -> IntArray | None:
     """Close a loop of points by faces between them [Barequet and Sharir 1995; Liepa 2003, section 3].
 
-    The sharpest bend, between two new faces or a new one and one beside the loop, is the least possible;
-    among equals the sum of squared edge lengths is. (Areas, which the source takes, are all the same in
-    a plane, where many holes lie.)
+    The sharpest bend, between two new faces or a new one and one beside the loop, is to be as small as
+    possible, and among equals the sum of squared edge lengths. (Areas, which the source takes, are all
+    the same in a plane, where many holes lie.) Every chord remembers one way to close what it cuts off,
+    so the best may be missed by a little.
 
     Parameters
     ----------
