@@ -32,7 +32,7 @@ class Dirt(NamedTuple):
 ACCEPTANCE = Dirt(islands=1500, handles=40, holes=60, noise=0.4)
 
 
-def scan(voxel: float = 0.0124, dirt: Dirt = ACCEPTANCE, seed: int = 0) -> Arrays:
+def scan(voxel: float = 0.0113, dirt: Dirt = ACCEPTANCE, seed: int = 0) -> Arrays:
     """Noisy scan of the creature; V and F of 300,000 faces by default."""
     rng = np.random.default_rng(seed)
     field = creature_on_grid(voxel)

@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from ..core.arguments import count
-from ..core.vocabulary import FloatArray, IntArray
-from ..mesh.edges import unique_edges
+from ..core.vocabulary import FloatArray
+from ..mesh.edges import halfedge_ends
 from .movable import Movable, as_movable, keep_vanished, warn_if_idle
 
 __all__ = ["denoise"]
@@ -82,14 +82,11 @@ def denoise(
 def _means_of_neighbours(surface: Movable) -> sp.csr_array:
     """Matrix that leads from every vertex to the mean of its neighbours; zero where it stays."""
     n = len(surface.V)
-    a, b = unique_edges(surface.F).T
-    links = sp.csr_array(
-        (np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(n, n)
-    )
+    start, end = halfedge_ends(surface.F)
+    # Entries of one place are added up; every neighbour counts once, however many faces have the edge.
+    links = sp.csr_array((np.ones(len(start)), (start, end)), shape=(n, n))
+    links = links + links.T
+    links.data[:] = 1.0
     moves = np.where(surface.stays, 0.0, 1.0)
-    share = moves / np.maximum(_valences(n, a, b), 1)
+    share = moves / np.maximum(links.sum(axis=1), 1.0)
     return sp.csr_array(sp.diags_array(share) @ links - sp.diags_array(moves))
-
-
-def _valences(n: int, a: IntArray, b: IntArray) -> IntArray:
-    return np.bincount(a, minlength=n) + np.bincount(b, minlength=n)

@@ -12,7 +12,7 @@ from ..core.arguments import choice
 from ..core.check import as_mask, as_mesh
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import RemeshWarning
-from ..mesh.edges import components, count_edges, halfedge_ends, used_vertices
+from ..mesh.edges import boundary_vertices, components, halfedge_ends, used_vertices
 from ..mesh.repair import drop_degenerate_faces, weld_vertices
 
 __all__ = ["BOUNDARIES", "Movable", "as_movable", "double_areas", "keep_vanished", "warn_if_idle"]
@@ -53,24 +53,19 @@ def as_movable(V: ArrayLike, F: ArrayLike, boundary: str, fixed: ArrayLike | Non
     stays = ~used_vertices(faces, n)
     stays[representative[is_fixed]] = True
     if boundary == "fixed":
-        stays[_boundary_vertices(faces)] = True
+        stays[boundary_vertices(faces, n)] = True
     part = components(n, *halfedge_ends(faces))[1]
     return Movable(vertices, faces, representative, stays, part)
 
 
 def _weld_boundary(V: FloatArray, F: IntArray) -> tuple[NDArray[np.signedinteger], IntArray]:
-    rim = _boundary_vertices(F)
+    rim = boundary_vertices(F, len(V))
     found = weld_vertices(V, rim) if len(rim) else None
     if found is None:
         return np.arange(len(V)), F
     welded = found[F]
     kept = drop_degenerate_faces(welded)
     return found, (welded if kept is None else welded[kept]).astype(np.int64)
-
-
-def _boundary_vertices(F: IntArray) -> IntArray:
-    edges, uses = count_edges(F)
-    return np.unique(edges[uses == 1])
 
 
 def warn_if_idle(surface: Movable) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.vocabulary import FloatArray, IntArray
 from ..mesh.edges import edge_keys, halfedge_ends
-from .match import single_halfedges
+from ..mesh.singles import single_halfedges
 from .triangulate import triangulate
 
 __all__ = ["Filled", "fill_loops"]

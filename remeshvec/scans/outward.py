@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
-from .match import single_halfedges
+from ..mesh.singles import single_halfedges
 
 __all__ = ["turn_outwards"]
 

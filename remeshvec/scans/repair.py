@@ -14,8 +14,8 @@ from ..errors import MeshInputError
 from ..mesh.edges import components, halfedge_ends
 from ..mesh.orient import orient_faces
 from ..mesh.repair import drop_degenerate_faces, drop_duplicate_faces
+from ..mesh.singles import match
 from .holes import fill_loops
-from .match import match
 from .outward import turn_outwards
 from .report import RepairReport, RepairResult
 from .weld import weld_boundary

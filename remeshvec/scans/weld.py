@@ -7,7 +7,7 @@ import numpy as np
 from ..core.vocabulary import FloatArray, IntArray
 from ..mesh.edges import components, halfedge_ends
 from ..mesh.repair import weld_vertices
-from .match import single_halfedges
+from ..mesh.singles import single_halfedges
 
 __all__ = ["weld_boundary"]
 

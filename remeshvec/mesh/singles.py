@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.vocabulary import NONE, IntArray
-from ..mesh.twins import Matched, match_halfedges
+from .twins import Matched, match_halfedges
 
 __all__ = ["match", "single_halfedges"]
 
