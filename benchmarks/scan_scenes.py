@@ -16,7 +16,7 @@ VIEW = (20.0, 15.0)
 
 def scan_steps() -> Picture:
     """A raw scan, repaired, without its noise, and remeshed."""
-    V, F = scan(0.032, Dirt(islands=150, handles=0, holes=14, noise=0.4), seed=1)
+    V, F = scan(0.032, Dirt(islands=150, handles=0, holes=8, noise=0.4), seed=3)
     body = repair(V, F, keep_largest=True, fill_holes=100)
     filled = by_label(np.where(body.face_source < 0, 1, 0))
     calm = denoise(body.V, body.F)

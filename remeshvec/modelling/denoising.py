@@ -16,7 +16,8 @@ from .movable import Movable, as_movable, keep_vanished, warn_if_idle
 __all__ = ["denoise"]
 
 # Steps of the filter: one that shrinks, and one that blows up again. The inverses add up to the
-# frequency that passes unchanged; .02 keeps volumes within .04 %, where the usual .1 gains .3 % to .6 %.
+# frequency that passes unchanged. On a creature of 35,000 faces .02 keeps the volume within .04 %, where
+# the usual .1 gains .3 % to .6 %.
 _SHRINK = 0.5
 _PASS = 0.02
 _GROW = 1.0 / (_PASS - 1.0 / _SHRINK)
@@ -33,8 +34,9 @@ def denoise(
     """Remove noise from a surface and keep its volume and its thin parts.
 
     Every iteration is a step towards the mean of the neighbours and a longer one back [Taubin 1995,
-    section 3]. Together they damp the waves of a few edges and leave all longer ones, so nothing shrinks
-    as in the flow of `smooth`. The weights do not depend on the shape of the faces: needles and faces
+    section 3]. Together they damp the waves of a few edges and leave all longer ones, so bodies do not shrink
+    as in the flow of `smooth`; only what is a few edges thick does, a little: a tube of twelve edges around
+    loses 6 % of its volume in 20 iterations. The weights do not depend on the shape of the faces: needles and faces
     without area, as marching cubes leave them, do no harm, and become rounder.
 
     Parameters
