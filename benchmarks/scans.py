@@ -207,10 +207,10 @@ decides: what is best in one row is among the worst in another. A filter without
 times as fast, is what the package has. The flow of `smooth` removes noise, and the shape with it."""
 
 HOLES = """Twelve holes in a creature, with 303 edges in all. PyVista loses the winding of faces, and
-takes a radius in place of a number of edges. pymeshfix is under the AGPL, writes to the terminal, and keeps one
-component only in its usual call. So `repair` closes holes itself, with the bends of Liepa (2003), and
-takes libigl for sheets that meet in an edge and SciPy for vertices that are close. Faces that cross are
-for pymeshfix, before the call."""
+takes a radius in place of a number of edges. pymeshfix is under the AGPL, writes to the terminal, and
+keeps one component only in its usual call. So `repair` closes holes itself, with the bends of Liepa
+(2003), and takes libigl for sheets that meet in an edge and SciPy for vertices that are close. Faces
+that cross are for pymeshfix, before the call."""
 
 
 def _page(facts: dict[str, str], run: dict[str, Any], noise: str, holes: str) -> str:

@@ -34,10 +34,10 @@ def denoise(
     """Remove noise from a surface and keep its volume and its thin parts.
 
     Every iteration is a step towards the mean of the neighbours and a longer one back [Taubin 1995,
-    section 3]. Together they damp the waves of a few edges and leave all longer ones, so bodies do not shrink
-    as in the flow of `smooth`; only what is a few edges thick does, a little: a tube of twelve edges around
-    loses 6 % of its volume in 20 iterations. The weights do not depend on the shape of the faces: needles and faces
-    without area, as marching cubes leave them, do no harm, and become rounder.
+    section 3]. Together they damp the waves of a few edges and leave all longer ones, so bodies do not
+    shrink as in the flow of `smooth`; only what is a few edges thick does, a little: a tube of twelve
+    edges around loses 6 % of its volume in 20 iterations. The weights do not depend on the shape of the
+    faces: needles and faces without area, as marching cubes leave them, do no harm, and become rounder.
 
     Parameters
     ----------
