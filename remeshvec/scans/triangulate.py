@@ -14,7 +14,11 @@ __all__ = ["triangulate"]
 _SAME_BEND = 1e-2
 
 _NO_BEND = -1.0
-_IMPOSSIBLE = 2.0  # above the negative cosine of any bend
+_FLAT = 1.5  # of a face without area: worse than a fold, which is 1
+_IMPOSSIBLE = 2.0
+
+# A face without area: its area is this much smaller than its squared edges.
+_NO_AREA = 1e-9
 
 
 def triangulate(P: FloatArray, outer: FloatArray, taken: BoolArray) -> IntArray | None:
@@ -75,6 +79,8 @@ def _choose_apexes(P, outer, taken, apex):
                 if worst >= _IMPOSSIBLE or worst > bend[i, j] + _SAME_BEND:
                     continue
                 x, y, z, squares = _face(P, j, m, i)
+                if x == 0.0 and y == 0.0 and z == 0.0:
+                    worst = max(worst, _FLAT)
                 worst = max(worst, _bend_to(normal, i, m, x, y, z))
                 worst = max(worst, _bend_to(normal, m, j, x, y, z))
                 if is_last:
@@ -98,9 +104,9 @@ def _face(P, a, b, c):
     squares = ux * ux + uy * uy + uz * uz + vx * vx + vy * vy + vz * vz
     squares += wx * wx + wy * wy + wz * wz
     length = np.sqrt(x * x + y * y + z * z)
-    if length > 0.0:
-        x, y, z = x / length, y / length, z / length
-    return x, y, z, squares
+    if not length > _NO_AREA * squares:
+        return 0.0, 0.0, 0.0, squares
+    return x / length, y / length, z / length, squares
 
 
 @inlined

@@ -80,6 +80,22 @@ def test_a_flat_loop_has_short_edges():
     assert longest < 2.5  # across the ellipse, not along it
 
 
+def test_straight_sides_give_no_face_without_area():
+    """A square hole with six points a side: three neighbours on a side make no triangle."""
+    side = np.arange(6.0)
+    zero = np.zeros(6)
+    P = np.concatenate(
+        [
+            np.stack([zero, side, zero], axis=1),
+            np.stack([side, zero + 6, zero], axis=1),
+            np.stack([zero + 6, 6 - side, zero], axis=1),
+            np.stack([6 - side, zero, zero], axis=1),
+        ]
+    )
+    faces = triangulate(P, np.tile([0, 0, 1.0], (24, 1)), no_chords(24))
+    assert unit_normals(P, faces) == pytest.approx(np.tile([0, 0, 1.0], (22, 1)))
+
+
 def test_every_edge_has_its_faces():
     P, outer = saddle(30, 1)
     edges = edges_of(triangulate(P, outer, no_chords(30)).tolist())
