@@ -20,7 +20,7 @@ from data.shapes.drawn import double_bubble, flag, half_discs, notched_sheet
 from remeshvec import Adaptive, remesh
 from remeshvec.files.data_files import read_data
 
-from . import creases
+from . import creases, scan_scenes
 from .films import catenoid, cube, rings, splitting
 from .meshes import load_arrays
 from .panels import (
@@ -230,6 +230,7 @@ PICTURES: dict[str, Callable[[], Picture]] = {
         rings,
         splitting,
         *creases.PICTURES,
+        *scan_scenes.PICTURES,
     )
 }
 

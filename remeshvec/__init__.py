@@ -32,12 +32,15 @@ if TYPE_CHECKING:
     from .batch.one_file import remesh_file
     from .batch.one_item import remesh_item
     from .html_page.page import html_report, show_html, write_html
+    from .modelling.denoising import denoise
     from .modelling.editing import Editor, deform
     from .modelling.fairing import fair
     from .modelling.laplacians import cotangent_matrix, laplacian, vertex_areas
     from .modelling.multiresolution import EditedSurface, MultiresolutionEditor
     from .modelling.smoothing import smooth
     from .modelling.solver import LaplacianSolver
+    from .scans.repair import repair
+    from .scans.report import RepairReport, RepairResult
 
 __all__ = [
     "Adaptive",
@@ -57,12 +60,15 @@ __all__ = [
     "RemeshResult",
     "RemeshWarning",
     "RemeshvecError",
+    "RepairReport",
+    "RepairResult",
     "Report",
     "SingularSystemError",
     "SurfaceDistance",
     "WorkerError",
     "cotangent_matrix",
     "deform",
+    "denoise",
     "fair",
     "find_creases",
     "html_report",
@@ -73,6 +79,7 @@ __all__ = [
     "remesh_file",
     "remesh_item",
     "remesh_many",
+    "repair",
     "show_html",
     "smooth",
     "surface_distance",
@@ -88,14 +95,18 @@ _LAZY = {
     "Editor": "modelling.editing",
     "LaplacianSolver": "modelling.solver",
     "MultiresolutionEditor": "modelling.multiresolution",
+    "RepairReport": "scans.report",
+    "RepairResult": "scans.report",
     "cotangent_matrix": "modelling.laplacians",
     "deform": "modelling.editing",
+    "denoise": "modelling.denoising",
     "fair": "modelling.fairing",
     "html_report": "html_page",
     "laplacian": "modelling.laplacians",
     "remesh_file": "batch.one_file",
     "remesh_item": "batch.one_item",
     "remesh_many": "batch.many",
+    "repair": "scans.repair",
     "show_html": "html_page",
     "smooth": "modelling.smoothing",
     "vertex_areas": "modelling.laplacians",

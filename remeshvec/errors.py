@@ -19,7 +19,7 @@ class RemeshvecError(Exception):
 
 
 class RemeshWarning(UserWarning):
-    """A result does not keep a bound that was asked for; the message has the numbers."""
+    """A result does not keep a bound, or a part was left as it was; the message has the numbers."""
 
 
 class MeshInputError(RemeshvecError, ValueError):

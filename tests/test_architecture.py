@@ -16,7 +16,7 @@ FLOORS = [
     ["errors"],
     ["core"],
     ["mesh", "processes"],
-    ["measures", "interop", "features", "input"],
+    ["measures", "interop", "features", "input", "scans"],
     ["files", "sizing"],
     ["viz", "reference"],
     ["html_page", "operations"],

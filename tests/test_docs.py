@@ -24,7 +24,16 @@ LINK = re.compile(r"\]\((?!https?:)([^)#]+)")
 CITED = re.compile(r"\[+([A-Z][a-z]+)[^\[\]]*?\b((?:19|20)\d\d)\b")
 
 # Packages that only examples need: where one is absent, a page runs up to the block that imports it.
-OPTIONAL = {"dask", "distributed", "meshio", "pyvista", "skfem", "torch", "trimesh"}
+OPTIONAL = {
+    "dask",
+    "distributed",
+    "meshio",
+    "pyvista",
+    "skfem",
+    "skimage",
+    "torch",
+    "trimesh",
+}
 
 
 def name_of(page):

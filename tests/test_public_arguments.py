@@ -51,6 +51,8 @@ RECORDS = {
     "Defects",
     "MeshFile",
     "Quality",
+    "RepairReport",
+    "RepairResult",
     "Report",
     "SurfaceDistance",
 }  # made by the library
@@ -141,6 +143,18 @@ TABLE = {
             "samples": NOT_COUNTS,
         },
         lambda: {"V1": V, "F1": F, "V2": V, "F2": F},
+    ),
+    remeshvec.repair: Entry(
+        {
+            "V": NOT_VERTICES,
+            "F": NOT_FACES,
+            "weld": [*NOT_NUMBERS, -1.0],
+            "min_component": [value for value in NOT_COUNTS if value != 0],
+            "keep_largest": NOT_FLAGS_OR_NONE,
+            "fill_holes": [*(value for value in NOT_COUNTS if value != 0), "none", None],
+            "orient": NOT_FLAGS_OR_NONE,
+        },
+        lambda: {"V": V, "F": F},
     ),
     Adaptive: Entry(
         {

@@ -28,6 +28,8 @@ examples:
   remeshvec cat.obj --html report.html                a page to read and to share
   remeshvec part.stl -o part.ply --feature-angle 30   keep edges that turn by more than 30 degrees
   remeshvec cat.obj -o fine.obj --adaptive 0.001      short edges where the surface is curved
+  remeshvec scan.stl -o clean.ply --keep-largest --fill-holes 100 --denoise 20
+                                                      one clean, closed surface of a raw one
 
   remeshvec batch 'in/*.obj' --out even               many meshes; see remeshvec batch --help
 
@@ -69,6 +71,7 @@ def parser() -> argparse.ArgumentParser:
     )
     result.add_argument("input", metavar="INPUT", help="mesh file")
     result.add_argument("-o", "--output", metavar="OUTPUT", help="mesh file to write")
+    _add_repair_options(result.add_argument_group("what to repair first"))
     lengths = _add_size_options(result.add_argument_group("how long edges become"))
     lengths.add_argument("--lengths", metavar="FILE", help="target edge length at every vertex")
     keep = result.add_argument_group("what to keep")
@@ -307,6 +310,45 @@ def _add_remesh_options(group: argparse._ArgumentGroup) -> None:
         help="hold the mesh where faces would come to cross others",
     )
     group.add_argument("--threads", type=_at_least_one, metavar="N", help="number of threads")
+
+
+def _add_repair_options(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--repair",
+        action="store_true",
+        help="join, orient and part the faces of a raw surface; the flags below do this too",
+    )
+    group.add_argument(
+        "--keep-largest", action="store_true", help="remove all but the largest component"
+    )
+    group.add_argument(
+        "--min-component",
+        type=_at_least_one,
+        metavar="N",
+        help="remove components of fewer faces",
+    )
+    group.add_argument(
+        "--fill-holes",
+        type=_number_or_all,
+        metavar="N",
+        help="close holes of up to so many edges; all: every hole",
+    )
+    group.add_argument(
+        "--weld",
+        type=_positive_number,
+        metavar="D",
+        help="join vertices of the boundary up to this distance apart",
+    )
+    group.add_argument(
+        "--denoise",
+        type=_at_least_one,
+        metavar="N",
+        help="remove noise in so many iterations, and keep the volume; 10 to 40 suit scans",
+    )
+
+
+def _number_or_all(text: str) -> int | str:
+    return text if text == "all" else _at_least_one(text)
 
 
 def _add_report_options(group: argparse._ArgumentGroup) -> None:

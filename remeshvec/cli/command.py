@@ -26,6 +26,7 @@ from ..measures.quality import side_by_side
 from ..output.result import RemeshResult
 from .arguments import FILE_OPTIONS, given_options, parse, parser, target_length
 from .array_files import read_array, write_arrays
+from .repair_step import check_repair, is_asked_for, repaired
 
 __all__ = ["main"]
 
@@ -85,7 +86,12 @@ def _run(options: argparse.Namespace) -> int:
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
         data, notices = read_data(options.input)
+    raw = MeshFile(data.V, data.F, notices)
+    with _timed(seconds, "repair"):
+        data, repairs = repaired(options, data)
     mesh = MeshFile(data.V, data.F, notices)
+    if repairs:
+        notices.append(f"repaired: {repairs}")
     with _progress(options.quiet) as callback:
         result = remeshvec.remesh(
             mesh.V,
@@ -105,7 +111,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.save_arrays:
         write_arrays(options.save_arrays, result)
     if options.picture:
-        _make_picture(options, mesh, result)
+        _make_picture(options, raw, result)
     if options.html:
         _write_page(options, result)
     if not options.quiet:
@@ -113,13 +119,14 @@ def _run(options: argparse.Namespace) -> int:
     if options.visualize:
         from .. import viz
 
-        lines = (result.input_feature_edges, result.feature_edges)
-        viz.show((mesh.V, mesh.F), (result.V, result.F), lines=lines, up=options.up)
+        lines = _lines(options, result)
+        viz.show((raw.V, raw.F), (result.V, result.F), lines=lines, up=options.up)
     return 0
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written or shown, before the work starts."""
+    check_repair(options)
     if options.output:
         check_data_writable(options.output)
     for path in (options.save_stats, options.save_arrays):
@@ -214,12 +221,17 @@ def _progress(quiet: bool) -> Iterator[ProgressLine | None]:
         progress.clear()
 
 
-def _make_picture(options: argparse.Namespace, mesh: MeshFile, result: RemeshResult) -> None:
+def _make_picture(options: argparse.Namespace, raw: MeshFile, result: RemeshResult) -> None:
     from .. import viz
 
-    lines = (result.input_feature_edges, result.feature_edges)
-    before, after = (mesh.V, mesh.F), (result.V, result.F)
-    viz.picture(options.picture, before, after, lines=lines, up=options.up)
+    before, after = (raw.V, raw.F), (result.V, result.F)
+    viz.picture(options.picture, before, after, lines=_lines(options, result), up=options.up)
+
+
+def _lines(options: argparse.Namespace, result: RemeshResult) -> tuple[Any, Any]:
+    """Return the edges to draw in red; a repair numbers vertices anew, so the raw mesh has none."""
+    before = None if is_asked_for(options) else result.input_feature_edges
+    return before, result.feature_edges
 
 
 def _write_page(options: argparse.Namespace, result: RemeshResult) -> None:

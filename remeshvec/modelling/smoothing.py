@@ -9,16 +9,20 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.arguments import choice, count, flag, number
-from ..core.check import as_mask, as_mesh
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
-from ..mesh.edges import components, count_edges, halfedge_ends, lengths_in_triangles, used_vertices
+from ..mesh.edges import components, halfedge_ends, lengths_in_triangles, used_vertices
 from .laplacians import AREAS, Area, cotangent_matrix, vertex_areas
+from .movable import Movable, as_movable, double_areas, keep_vanished, warn_if_idle
 from .solver import LaplacianSolver
 
 __all__ = ["smooth"]
 
-BOUNDARIES = ("fixed", "free")
+# Faces lower than this share of their longest edge have no cotangents that a solution could bear.
+_FLAT = 1e-8
+
+# A step that leaves less of a volume has taken the component to a point, or to threads.
+_VANISHED_VOLUME = 1e-3
 
 
 def smooth(
@@ -36,7 +40,8 @@ def smooth(
 
     Each step solves ``(M - step C) x' = M x`` [Desbrun et al. 1999, section 2.3], where M are the
     vertex areas and C is the cotangent matrix of the surface before the step. Waves shorter than about
-    ``2 pi sqrt(step)`` vanish. The system is symmetric and positive definite for any step.
+    ``2 pi sqrt(step)`` vanish. The system is symmetric and positive definite for any step. The flow
+    shrinks what it smooths, and pinches thin handles off: for noise on scans, `denoise` is better.
 
     Parameters
     ----------
@@ -50,7 +55,8 @@ def smooth(
         Scale every component about its centre of area after each step, so that it encloses the same
         volume as before [Desbrun et al. 1999, section 3.3]. Only for closed, oriented surfaces.
     boundary : {"fixed", "free"}
-        Whether boundary vertices stay; free ones shrink into the surface, as a soap film would.
+        Whether boundary vertices stay; free ones shrink into the surface, as a soap film would. Boundary
+        vertices in exactly one place move as one, so triangles that are not joined stay together.
     fixed : (k,) int or (n,) bool, optional
         Vertices that stay.
     area : {"voronoi", "uniform"}
@@ -64,59 +70,66 @@ def smooth(
     Raises
     ------
     MeshInputError
-        V and F are not a mesh; a face has no area, or lost it in a step in which a thin part vanishes
-        (remesh between steps, or take fewer); or ``keep_volume`` is set for a surface that is not closed.
+        V and F are not a mesh, or ``keep_volume`` is set for a surface that is not closed.
     OptionError
         ``step`` is not positive, or another option is invalid.
+
+    Warns
+    -----
+    RemeshWarning
+        Components would vanish, and stay as they are; or no vertex can move.
     """
-    vertices, faces = as_mesh(V, F)
-    time = _smoothing_step(step, vertices, faces)
+    surface = as_movable(V, F, boundary, fixed)
+    time = _smoothing_step(step, surface)
     steps = count(iterations, "iterations")
     choice(area, "area", AREAS)
-    stays = _staying(len(vertices), faces, choice(boundary, "boundary", BOUNDARIES), fixed)
     parts = []
     if flag(keep_volume, "keep_volume"):
-        parts = _closed_parts(vertices, faces)
-        if stays[faces].any():
+        parts = _closed_parts(surface.V, surface.F)
+        if surface.stays[surface.F].any():
             raise OptionError("keep_volume moves all vertices; it cannot hold some fixed")
-    x = vertices.copy()
-    for i in range(steps):
-        x = _flow(x, faces, stays, time, area, i)
+    warn_if_idle(surface)
+    x = surface.V.copy()
+    gone = np.empty(0, np.int64)
+    for _ in range(steps):
+        gone = np.union1d(gone, _vanishing(surface, x, time))
+        stays = surface.stays | np.isin(surface.part, gone)
+        x = _flow(x, surface.F, stays, time, area)
         for part, volume in parts:
-            _restore(x, faces[part], volume)
-    return x
+            if not stays[surface.F[part[0], 0]] and not _restore(x, surface.F[part], volume):
+                gone = np.union1d(gone, surface.part[surface.F[part[0], 0]])
+    keep_vanished(surface, x, gone)
+    return surface.spread(x)
 
 
-def _smoothing_step(step: float | None, V: FloatArray, F: IntArray) -> float:
+def _smoothing_step(step: float | None, surface: Movable) -> float:
     if step is None:
-        return float(lengths_in_triangles(V[F]).mean() ** 2)
+        return float(lengths_in_triangles(surface.V[surface.F]).mean() ** 2)
     return number(step, "step", above=0.0, unit="squared units of V")
 
 
-def _staying(n: int, F: IntArray, boundary: str, fixed: ArrayLike | None) -> BoolArray:
-    """Mask of the vertices that do not move, including those that no face uses."""
-    stays = ~used_vertices(F, n)
-    if fixed is not None:
-        stays |= as_mask(fixed, n, "fixed", "vertex")
-    if boundary == "fixed":
-        edges, uses = count_edges(F)
-        stays[edges[uses == 1]] = True
-    return stays
+def _vanishing(surface: Movable, x: FloatArray, time: float) -> IntArray:
+    """Return the components that one step shrinks to nothing: smaller than it, and held nowhere.
+
+    A sphere of radius R shrinks by ``1 + 2 time / R^2``: to .4 % if its area is the step.
+    """
+    n = int(surface.part.max()) + 1
+    double_area = np.bincount(surface.part[surface.F[:, 0]], double_areas(x, surface.F), n)
+    held = np.zeros(n, np.bool_)
+    held[surface.part[surface.stays & used_vertices(surface.F, len(x))]] = True
+    return np.flatnonzero(~held & (double_area > 0.0) & (double_area < 2.0 * time))
 
 
-def _flow(
-    x: FloatArray, F: IntArray, stays: BoolArray, time: float, area: Area, i: int
-) -> FloatArray:
-    """Take one implicit step; i counts the steps before it, for messages."""
-    try:
-        C = cotangent_matrix(x, F)
-    except MeshInputError as error:
-        if i == 0:
-            raise
-        raise MeshInputError(f"after {i} steps: {error}") from error
+def _flow(x: FloatArray, F: IntArray, stays: BoolArray, time: float, area: Area) -> FloatArray:
+    """Take one implicit step; faces without area pull at nothing, and their own vertices stay."""
+    longest = lengths_in_triangles(x[F]).max(axis=1)
+    F = F[double_areas(x, F) > _FLAT * longest**2]
+    stays = stays | ~used_vertices(F, len(x))
+    if stays.all():
+        return x
     # Vertices between vanishing faces may have an area of 0; they are already fair.
     mass = np.maximum(vertex_areas(x, F, area), np.finfo(float).tiny)
-    A = sp.diags_array(mass) - time * C
+    A = sp.diags_array(mass) - time * cotangent_matrix(x, F)
     solved = LaplacianSolver(A, stays).solve(mass[:, None] * x, x[stays])
     solved[stays] = x[stays]
     return solved
@@ -143,13 +156,14 @@ def _volume(V: FloatArray, F: IntArray) -> float:
     return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0)
 
 
-def _restore(x: FloatArray, F: IntArray, volume: float) -> None:
-    """Scale a component to its former volume, in place."""
+def _restore(x: FloatArray, F: IntArray, volume: float) -> bool:
+    """Scale a component to its former volume, in place; False if it has vanished or turned inside out."""
     now = _volume(x, F)
-    if volume == 0.0 or not now / volume > 0.0:
-        raise MeshInputError("a component turned inside out or vanished; take smaller steps")
+    if volume == 0.0 or not now / volume > _VANISHED_VOLUME:
+        return False
     a, b, c = (x[F[:, i]] for i in range(3))
     weight = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     centre = (weight @ (a + b + c)) / (3.0 * weight.sum())
     vertices = np.unique(F)
     x[vertices] = centre + (x[vertices] - centre) * np.cbrt(volume / now)
+    return True

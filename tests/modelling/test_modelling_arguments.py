@@ -32,6 +32,7 @@ from remeshvec import (
     MultiresolutionEditor,
     cotangent_matrix,
     deform,
+    denoise,
     fair,
     laplacian,
     smooth,
@@ -110,6 +111,9 @@ TABLE = {
             "fixed": [*NOT_INDICES, HANDLE[1:]],
         },
         mesh,
+    ),
+    denoise: Entry(
+        {**MESH, **STEPS, "boundary": NOT_WORDS, "fixed": [*NOT_INDICES, HANDLE[1:]]}, mesh
     ),
     Editor: Entry(PARTS, parts),
     Editor.move: Entry(

@@ -1,0 +1,1 @@
+"""From a raw surface, as scanners and marching cubes leave it, to one that is clean and closed."""
