@@ -23,6 +23,7 @@ from .disk import (
     write_file,
 )
 from .foreign import can_write, read_foreign, write_foreign
+from .materials import known_materials, with_library
 from .mesh_files import SUFFIXES, read_mesh, write_mesh
 from .obj import OBJ_DATA, ObjFile, obj_bytes
 from .ply import PlyFile, ply_bytes
@@ -35,6 +36,8 @@ __all__ = [
     "write_data",
 ]
 
+WITH_LIBRARY = (".obj", ".ply", ".vtp", ".vtu")  # name a material library beside them
+WITH_IMAGES = (".glb", ".gltf")
 # Suffixes that patterns match; files with other suffixes are read if they are named.
 COMMON_SUFFIXES = (*SUFFIXES, ".vtk", ".vtu", ".vtp", ".msh", ".xdmf", ".glb", ".gltf")
 
@@ -112,15 +115,24 @@ def write_data(path: FilePath, data: MeshData) -> list[str]:
     arguments.instance(data, "data", MeshData, "a MeshData")
     suffix = path.suffix.lower()
     carried = {*data.on_vertices, *data.on_faces, *data.on_corners}
+    textures = set() if suffix in WITH_LIBRARY + WITH_IMAGES else _textures(data)
     if suffix in SUFFIXES and (suffix not in (".obj", ".ply") or not carried):
         write_mesh(path, data.V, data.F)
-        return sorted(carried)
+        return sorted(carried | textures)
     with named_errors("write", path):
+        if suffix in WITH_LIBRARY:
+            data = with_library(data, path)
         if suffix == ".obj":
             content, held = obj_bytes(data, path), {*OBJ_DATA}
         elif suffix == ".ply":
-            content, held = ply_bytes(data), carried - (set(data.on_corners) - {"uv"})
+            content, held = ply_bytes(data, path), carried - (set(data.on_corners) - {"uv"})
         else:
             content, held = write_foreign(path, data)
     write_file(path, content)
-    return sorted(carried - held)
+    return sorted((carried - held) | textures)
+
+
+def _textures(data: MeshData) -> set[str]:
+    """Name the images of materials, for formats that hold none."""
+    has_images = any(material.image is not None for material in known_materials(data))
+    return {"images of materials"} if has_images else set()

@@ -139,7 +139,7 @@ _PARSERS: dict[str, Callable[[bytes], PolygonMesh]] = {
 _WRITERS: dict[str, Callable[[FloatArray, IntArray, Path], bytes]] = {
     ".obj": lambda V, F, path: obj_bytes(MeshData(V, F), path),
     ".off": lambda V, F, _: off_bytes(V, F),
-    ".ply": lambda V, F, _: ply_bytes(MeshData(V, F)),
+    ".ply": lambda V, F, path: ply_bytes(MeshData(V, F), path),
     ".stl": lambda V, F, _: stl_bytes(V, F),
     ".json": lambda V, F, _: json_bytes(V, F),
 }
