@@ -36,6 +36,6 @@ class RemeshvecAccessor:
         return remesh(self._mesh, L, **options)
 
     def quality(self) -> Quality:
-        """Measure edges, areas, angles and valences; triangles only."""
+        """Measure edges, areas, angles and valences; polygons are triangulated."""
         surface = self._mesh if self._mesh.is_all_triangles else self._mesh.triangulate()
         return quality(surface.points, surface.regular_faces)

@@ -14,7 +14,15 @@ from ..core.lazy import Lazy, LazyRecipe
 from ..core.vocabulary import FloatArray, IntArray
 from .records import Births
 from .report import Report
-from .transfer import TRANSFER_METHODS, as_matrix, as_values, interpolate, pick, to_numpy
+from .transfer import (
+    TRANSFER_METHODS,
+    as_matrix,
+    as_values,
+    in_kind_of,
+    interpolate,
+    pick,
+    to_numpy,
+)
 
 __all__ = ["RemeshResult"]
 
@@ -27,7 +35,8 @@ class RemeshResult:
 
     What few callers read is computed when it is first asked for. Until then a result holds the faces
     of the input and its own once more in memory. It keeps a copy of the input, so the caller may go on to
-    change those arrays in place.
+    change those arrays in place. Where V or F are tensors of PyTorch, everything else is a tensor too,
+    on the same device, floating-point numbers in the dtype of V.
 
     Attributes
     ----------
@@ -89,7 +98,7 @@ class RemeshResult:
     @property
     def birth_face(self) -> IntArray:
         """Input face on which each vertex lies, (n,)."""
-        return self._births()[0]
+        return self._as_given(self._births()[0])
 
     @property
     def birth_barycentric(self) -> FloatArray:
@@ -99,12 +108,12 @@ class RemeshResult:
         input; otherwise that is the point of the input closest to the vertex, among those that a walk
         over the input sees where it ends within 0.05 L.
         """
-        return self._births()[1]
+        return self._as_given(self._births()[1])
 
     @property
     def face_birth(self) -> IntArray:
         """Input face closest to the centroid of each face, (m,), between the same creases."""
-        return self._face_births()
+        return self._as_given(self._face_births())
 
     @property
     def corner_birth_face(self) -> IntArray:
@@ -112,47 +121,47 @@ class RemeshResult:
 
         Where `birth_face` names one side of a crease, seam or border, this names the side of the face.
         """
-        return self._corner_births()[0]
+        return self._as_given(self._corner_births()[0])
 
     @property
     def corner_birth_barycentric(self) -> FloatArray:
         """Where on its birth face each corner of each face lies, (m, 3, 3)."""
-        return self._corner_births()[1]
+        return self._as_given(self._corner_births()[1])
 
     @property
     def image_face(self) -> IntArray:
         """Output face closest to each input vertex, (n_in,); -1 for vertices that no face uses."""
-        return self._images()[0]
+        return self._as_given(self._images()[0])
 
     @property
     def image_barycentric(self) -> FloatArray:
         """Where on its image face each input vertex lies, (n_in, 3)."""
-        return self._images()[1]
+        return self._as_given(self._images()[1])
 
     @property
     def vertex_map(self) -> IntArray:
         """For every input vertex the output vertex that is the same, bit for bit; -1 for none."""
-        return self._vertex_map()
+        return self._as_given(self._vertex_map())
 
     @property
     def face_map(self) -> IntArray:
         """For every input face that had to stay the output face; -1 for the others."""
-        return self._face_map()
+        return self._as_given(self._face_map())
 
     @property
     def feature_edges(self) -> IntArray:
         """Edges on creases, boundaries, borders of labels, and where sheets meet, (k, 2)."""
-        return self._feature_edges()
+        return self._as_given(self._feature_edges())
 
     @property
     def input_feature_edges(self) -> IntArray:
         """The same of the input: its edges that were kept, (k, 2), as vertices of the input."""
-        return self._input_feature_edges()
+        return self._as_given(self._input_feature_edges())
 
     @property
     def corners(self) -> IntArray:
         """Vertices that did not move, (k,)."""
-        return self._corners()
+        return self._as_given(self._corners())
 
     # -- data -------------------------------------------------------------------------------
 
@@ -188,7 +197,7 @@ class RemeshResult:
         m = len(self._input_faces)
         if on == "faces":
             values = as_values(values, (m,), on)
-            return pick(values, self.face_birth)
+            return pick(values, self._face_births())
         if on == "vertices":
             values = as_values(values, (self._n_in,), on)
             return interpolate(values, *self._vertex_weights(), method)
@@ -210,15 +219,17 @@ class RemeshResult:
         Returns
         -------
         scipy.sparse.csr_array
-            (n, n_in), (m, m_in) or (3 m, 3 m_in) float64; the rows sum to 1.
+            (n, n_in), (m, m_in) or (3 m, 3 m_in) float64; the rows sum to 1. For tensors of PyTorch a
+            coalesced ``torch.sparse_coo_tensor`` in the dtype of V, on its device: gradients flow
+            through ``P @ x``.
         """
         m = len(self._input_faces)
         if choice(on, "on", _PLACES) == "faces":
-            births = self.face_birth
-            return as_matrix(births[:, None], np.ones((len(births), 1)), m)
+            births = self._face_births()
+            return self._as_given(as_matrix(births[:, None], np.ones((len(births), 1)), m))
         if on == "vertices":
-            return as_matrix(*self._vertex_weights(), self._n_in)
-        return as_matrix(*self._corner_weights(), 3 * m)
+            return self._as_given(as_matrix(*self._vertex_weights(), self._n_in))
+        return self._as_given(as_matrix(*self._corner_weights(), 3 * m))
 
     def transfer_back(self, values: Any, on: str = "vertices", method: str = "auto") -> Any:
         """Bring data of the result back to the vertices of the input.
@@ -239,13 +250,16 @@ class RemeshResult:
         on = choice(on, "on", ("vertices", "faces"))
         method = choice(method, "method", TRANSFER_METHODS)
         if on == "faces":
-            return pick(as_values(values, (len(self.F),), on), self.image_face)
+            return pick(as_values(values, (len(self.F),), on), self._images()[0])
         values = as_values(values, (len(self.V),), on)
         return interpolate(values, *self._image_weights(), method)
 
     def back_matrix(self) -> Any:
-        """Return the sparse matrix (n_in, n) with ``transfer_back(x) = B @ x``; rows sum to 1 or 0."""
-        return as_matrix(*self._image_weights(), len(self.V))
+        """Return the sparse matrix (n_in, n) with ``transfer_back(x) = B @ x``; rows sum to 1 or 0.
+
+        For tensors a sparse tensor, as `matrix`.
+        """
+        return self._as_given(as_matrix(*self._image_weights(), len(self.V)))
 
     @property
     def _input_faces(self) -> NDArray[Any]:
@@ -256,13 +270,18 @@ class RemeshResult:
         return len(to_numpy(self.report.before[0]))
 
     def _vertex_weights(self) -> tuple[IntArray, FloatArray]:
-        return self._input_faces[self.birth_face].astype(np.int64), self.birth_barycentric
+        face, weights = self._births()
+        return self._input_faces[face].astype(np.int64), weights
 
     def _corner_weights(self) -> tuple[IntArray, FloatArray]:
         face, weights = self._corner_births()
         return 3 * face.reshape(-1, 1) + np.arange(3), weights.reshape(-1, 3)
 
     def _image_weights(self) -> tuple[IntArray, FloatArray]:
-        index = to_numpy(self.F)[self.image_face].astype(np.int64)
-        index[self.image_face < 0] = -1
-        return index, self.image_barycentric
+        face, weights = self._images()
+        index = to_numpy(self.F)[face].astype(np.int64)
+        index[face < 0] = -1
+        return index, weights
+
+    def _as_given(self, value: Any) -> Any:
+        return in_kind_of((self.V, self.F), value)

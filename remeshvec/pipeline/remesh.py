@@ -10,7 +10,7 @@ from ..core.arguments import flag
 from ..errors import OptionError
 from ..input.options import RemeshKeywords, read_options, with_options
 from ..output.result import RemeshResult
-from ..output.transfer import is_tensor, like, to_numpy
+from ..output.transfer import in_kind_of, is_tensor, like, to_numpy
 from .arrays import remesh_arrays
 from .job import Lengths
 from .objects import are_arrays, is_pair, only_length, remesh_object
@@ -202,4 +202,8 @@ def remesh(
     result = remesh_arrays(V, F, L, wanted)
     if any(map(is_tensor, given)):
         result.V, result.F = (like(x, y) for x, y in zip(given, result, strict=True))
+        mesh = result.V, result.F
+        result.lengths = in_kind_of(mesh, result.lengths)
+        if result.face_labels is not None:
+            result.face_labels = in_kind_of(mesh, result.face_labels)
     return result
