@@ -15,6 +15,7 @@ from ..files.mesh_files import MeshFile
 from ..input.options import OPTION_NAMES, Boundary, Preset
 from ..measures.quality import quality
 from ..sizing.adaptive import Adaptive
+from .parser import OneLineParser
 
 __all__ = ["FILE_OPTIONS", "batch_parser", "given_options", "parse", "parser", "target_length"]
 
@@ -57,7 +58,7 @@ FILE_OPTIONS = {
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the shell command's arguments."""
-    result = argparse.ArgumentParser(
+    result = OneLineParser(
         prog="remeshvec",
         description="Remesh a triangle mesh to even triangles.\n"
         "Reads and writes OBJ, OFF, PLY, STL, and JSON with the keys verts and faces; and the formats\n"
@@ -80,7 +81,7 @@ def parser() -> argparse.ArgumentParser:
 
 def batch_parser() -> argparse.ArgumentParser:
     """Return the parser of ``remeshvec batch``: all arguments except elements of a single mesh."""
-    result = argparse.ArgumentParser(
+    result = OneLineParser(
         prog="remeshvec batch",
         description="Remesh many triangle meshes, several at a time.",
         epilog=BATCH_EPILOG,
@@ -333,16 +334,22 @@ def _add_report_options(group: argparse._ArgumentGroup) -> None:
 
 
 def _positive_number(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
     if not (value > 0 and math.isfinite(value)):
         raise argparse.ArgumentTypeError(f"{text} is not a positive number")
     return value
 
 
 def _at_least_one(text: str) -> int:
-    value = int(text)
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
     if value < 1:
-        raise argparse.ArgumentTypeError(f"{text} is less than 1")
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number, at least 1")
     return value
 
 

@@ -186,7 +186,7 @@ def require_plotly() -> Any:
     try:
         return importlib.import_module("plotly.offline")
     except ImportError as error:
-        raise PlotlyMissingError("HTML pages need Plotly: pip install 'remeshvec[html]'") from error
+        raise PlotlyMissingError("HTML pages need Plotly: pip install plotly") from error
 
 
 def _report_of(result: Any) -> Report:

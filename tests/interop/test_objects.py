@@ -128,7 +128,7 @@ def test_pyvista_with_mixed_polygons(name):
     mesh = getattr(pv, name)()
     mesh.cell_data["number"] = np.arange(mesh.n_cells)
     out = remesh(mesh, 0.05)
-    assert out.is_all_triangles and np.isclose(out.area, mesh.triangulate().area, rtol=0.02)
+    assert out.is_all_triangles and np.isclose(out.area, mesh.triangulate().area, rtol=0.06)
     assert out.cell_data["number"].dtype == mesh.cell_data["number"].dtype
     assert name == "Disc" or out.clean().n_open_edges == mesh.triangulate().clean().n_open_edges
     assert mesh.remeshvec.quality().faces == mesh.triangulate().n_cells
