@@ -16,7 +16,8 @@ from .errors import (
     SingularSystemError,
     WorkerError,
 )
-from .files.mesh_files import MeshFile, read_mesh, write_mesh
+from .files.mesh_files import MeshFile, read_mesh
+from .files.write import write_mesh
 from .measures.distance import SurfaceDistance, surface_distance
 from .measures.quality import Quality, quality
 from .output.defects import Defects

@@ -24,7 +24,7 @@ from .disk import (
 )
 from .foreign import can_write, read_foreign, write_foreign
 from .materials import known_materials, with_library
-from .mesh_files import SUFFIXES, read_mesh, write_mesh
+from .mesh_files import SUFFIXES, read_mesh, write_arrays
 from .obj import OBJ_DATA, ObjFile, obj_bytes
 from .ply import PlyFile, ply_bytes
 from .polygon_mesh import check_polygons, triangulated
@@ -117,7 +117,7 @@ def write_data(path: FilePath, data: MeshData) -> list[str]:
     carried = {*data.on_vertices, *data.on_faces, *data.on_corners}
     textures = set() if suffix in WITH_LIBRARY + WITH_IMAGES else _textures(data)
     if suffix in SUFFIXES and (suffix not in (".obj", ".ply") or not carried):
-        write_mesh(path, data.V, data.F)
+        write_arrays(path, data.V, data.F)
         return sorted(carried | textures)
     with named_errors("write", path):
         if suffix in WITH_LIBRARY:

@@ -18,7 +18,7 @@ from ..processes.pool import StandingWorker
 from .scene import read_scene, scene_bytes
 from .vtk_materials import material_fields, read_materials, with_fields
 
-__all__ = ["can_write", "read_foreign", "write_foreign"]
+__all__ = ["can_write", "read_foreign", "with_uv", "write_foreign"]
 
 _OWN = ".obj, .off, .ply, .stl, .json"
 # meshio reads these too, but as a drawing or a table, or only together with a second file.
@@ -119,7 +119,7 @@ def _read_here(task: tuple[str, Path], _: None) -> tuple[MeshData, list[str]]:
         data = read(found)
     data.wrap = None
     if name != "trimesh":
-        data = _with_uv(data)
+        data = with_uv(data)
         read_materials(data, found.field_data, path.parent)
     return data, [str(warning.message) for warning in noticed]
 
@@ -138,7 +138,7 @@ def _read_meshio(meshio: Any, path: Path) -> Any:
     raise problem
 
 
-def _with_uv(data: MeshData) -> MeshData:
+def with_uv(data: MeshData) -> MeshData:
     """Find texture coordinates by the name or the role of their data on vertices."""
     for name in (*data.feature_data, *_TEXTURE_COORDINATES):
         values = data.on_vertices.get(name)

@@ -24,7 +24,7 @@ from .ply import PlyFile, ply_bytes
 from .polygon_mesh import PolygonMesh, check_polygons, triangulated
 from .stl import parse_stl, stl_bytes
 
-__all__ = ["SUFFIXES", "MeshFile", "read_mesh", "write_mesh"]
+__all__ = ["SUFFIXES", "MeshFile", "checked_arrays", "read_mesh", "write_arrays"]
 
 
 class MeshFile(NamedTuple):
@@ -78,32 +78,18 @@ def read_mesh(path: FilePath) -> MeshFile:
         return MeshFile(np.ascontiguousarray(mesh.V), triangles.F, triangles.notices)
 
 
-def write_mesh(path: FilePath, V: ArrayLike, F: ArrayLike) -> None:
-    """Write a triangle mesh to an OBJ, OFF, PLY, STL or JSON file.
-
-    All formats but STL keep every bit of float64 coordinates; STL (binary) holds float32. A file
-    of this name is replaced when the new one is complete, and stays as it is if anything fails.
-
-    Parameters
-    ----------
-    path : str or path
-        The file; its suffix gives the format.
-    V : (n, 3) float
-        Vertex positions.
-    F : (m, 3) int
-        Faces, 0-based.
+def write_arrays(path: FilePath, V: ArrayLike, F: ArrayLike) -> None:
+    """Write a mesh without data in one of the package's own formats.
 
     Raises
     ------
     MeshFormatError
         The suffix is unknown, the mesh is not valid, or the file cannot be written.
-    OptionError
-        ``path`` is not a path.
     """
     path = Path(arguments.path(path, "path"))
     with named_errors("write", path):
         to_bytes = _WRITERS[_known_suffix(path)]
-        content = to_bytes(*_checked_arrays(np.asarray(V), np.asarray(F)), path)
+        content = to_bytes(*checked_arrays(np.asarray(V), np.asarray(F)), path)
     write_file(path, content)
 
 
@@ -114,7 +100,7 @@ def _known_suffix(path: Path) -> str:
     return suffix
 
 
-def _checked_arrays(V: NDArray, F: NDArray) -> tuple[FloatArray, IntArray]:
+def checked_arrays(V: NDArray, F: NDArray) -> tuple[FloatArray, IntArray]:
     """Refuse arrays that are not a triangle mesh."""
     if V.ndim != 2 or V.shape[1] != 3 or len(V) == 0:
         raise ValueError(f"vertices of shape (n, 3) are needed, not {V.shape}")

@@ -13,20 +13,25 @@ from ..interop.mesh_data import MeshData, corner_values
 from ..interop.objects import COLOUR, MATERIAL, UV, read_trimesh
 from .materials import WHITE, Material, image_bytes, known_materials, unique_names
 
-__all__ = ["read_scene", "scene_bytes"]
+__all__ = ["read_parts", "read_scene", "scene_bytes"]
 
 # Data on faces that a scene can hold.
 _ON_FACES = {"object", "material", "color"}
 
 
 def read_scene(scene: Any) -> MeshData:
-    """Join all meshes of a scene in place; where there are several, each is an object.
-
-    Texture coordinates lie on corners, colours are called ``"color"``, as other files have them.
-    """
+    """Join all meshes of a scene in place."""
     parts = [mesh for mesh in scene.dump(concatenate=False) if hasattr(mesh, "faces")]
     if not parts:
         raise ValueError("it holds no triangle mesh")
+    return read_parts(parts)
+
+
+def read_parts(parts: list[Any]) -> MeshData:
+    """Join meshes of trimesh; where there are several, each is an object.
+
+    Texture coordinates lie on corners, colours are called ``"color"``, as other files have them.
+    """
     read = [_with_file_names(read_trimesh(mesh)) for mesh in parts]
     start = np.cumsum([0, *(len(part.V) for part in read)])
     out = MeshData(

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from ..core.arguments import number
 from ..core.check import as_mesh
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
+from ..interop.given import MeshObject, takes_meshes
 
 __all__ = ["Elements", "Quality", "elements", "quality", "side_by_side"]
 
@@ -116,7 +117,8 @@ class Quality:
         return "\n".join(f"{label:<31}{value:>14}" for label, value in self.rows())
 
 
-def quality(V: ArrayLike, F: ArrayLike, L: float | None = None) -> Quality:
+@takes_meshes
+def quality(V: ArrayLike | MeshObject, F: Any = None, L: float | None = None) -> Quality:
     """Measure a triangle mesh.
 
     Dirty meshes are measured too: degenerate, duplicated and unreferenced elements, non-manifold
@@ -124,8 +126,8 @@ def quality(V: ArrayLike, F: ArrayLike, L: float | None = None) -> Quality:
 
     Parameters
     ----------
-    V : (n, 3) float
-        Vertex positions.
+    V : (n, 3) float, or a mesh
+        Vertex positions; or a whole mesh as for `remesh`, or a result, with ``L`` after it.
     F : (m, 3) int
         Faces, 0-based.
     L : float, optional

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,6 +12,7 @@ from ..core.arguments import choice, count, flag, number
 from ..core.check import as_mask, as_mesh
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
+from ..interop.given import MeshObject, takes_meshes
 from ..mesh.edges import components, count_edges, halfedge_ends, lengths_in_triangles, used_vertices
 from .laplacians import AREAS, Area, cotangent_matrix, vertex_areas
 from .solver import LaplacianSolver
@@ -21,9 +22,10 @@ __all__ = ["smooth"]
 BOUNDARIES = ("fixed", "free")
 
 
+@takes_meshes
 def smooth(
-    V: ArrayLike,
-    F: ArrayLike,
+    V: ArrayLike | MeshObject,
+    F: Any = None,
     step: float | None = None,
     iterations: int = 1,
     *,
@@ -40,7 +42,8 @@ def smooth(
 
     Parameters
     ----------
-    V : (n, 3) float
+    V : (n, 3) float, or a mesh
+        Or a whole mesh as for `remesh`, or a result; what comes back are its vertices.
     F : (m, 3) int
     step : float, optional
         Time per step, in squared units of V. By default the squared mean edge length.

@@ -15,9 +15,10 @@ from helpers import zoo
 from helpers.processes import surroundings
 
 import remeshvec
+from remeshvec import read_mesh, write_mesh
 from remeshvec.cli.command import ProgressLine, main
 from remeshvec.errors import OptionError
-from remeshvec.files.mesh_files import SUFFIXES, read_mesh, write_mesh
+from remeshvec.files.mesh_files import SUFFIXES
 
 
 def bumpy_sheet(n=12):

@@ -18,10 +18,9 @@ import pytest
 from helpers import zoo
 
 import remeshvec
-from remeshvec import html_page, html_report, remesh, write_html
+from remeshvec import html_page, html_report, remesh, write_html, write_mesh
 from remeshvec.cli.command import main
 from remeshvec.errors import MeshFormatError, OptionError, RemeshvecError
-from remeshvec.files.mesh_files import write_mesh
 from remeshvec.html_page import views as _page_views
 from remeshvec.html_page.page import _page_json
 from remeshvec.measures.quality import elements, quality

@@ -184,8 +184,8 @@ def _Recorded(pyvista, shown, **options):
 
 
 def test_the_command_makes_a_picture(pyvista, tmp_path, monkeypatch, capsys):
+    from remeshvec import write_mesh
     from remeshvec.cli.command import main
-    from remeshvec.files.mesh_files import write_mesh
 
     monkeypatch.chdir(tmp_path)
     write_mesh("in.obj", *box((1, 1, 1)))
