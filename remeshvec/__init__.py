@@ -19,7 +19,8 @@ from .errors import (
 from .files.mesh_files import MeshFile, read_mesh
 from .files.write import write_mesh
 from .measures.distance import SurfaceDistance, surface_distance
-from .measures.quality import Quality, quality
+from .measures.quality import quality
+from .measures.record import Quality
 from .output.defects import Defects
 from .output.report import Report
 from .output.result import RemeshResult

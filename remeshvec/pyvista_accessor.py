@@ -10,7 +10,8 @@ from .core.vocabulary import IntArray
 from .files.write import write_mesh
 from .input.options import RemeshKeywords
 from .measures.distance import SurfaceDistance, surface_distance
-from .measures.quality import Quality, quality
+from .measures.quality import quality
+from .measures.record import Quality
 from .pipeline.creases import find_creases
 from .pipeline.remesh import remesh
 

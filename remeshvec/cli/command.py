@@ -22,7 +22,6 @@ from ..files.data_files import check_data_writable, read_data, write_data
 from ..files.disk import check_writable, write_file
 from ..files.mesh_files import MeshFile
 from ..interop.mesh_data import carry
-from ..measures.quality import side_by_side
 from ..output.result import RemeshResult
 from .arguments import FILE_OPTIONS, given_options, parse, parser, target_length
 from .array_files import read_array, write_arrays
@@ -253,22 +252,9 @@ def _plain(value: Any) -> Any:
 def _print_report(
     options: argparse.Namespace, mesh: MeshFile, result: RemeshResult, seconds: dict[str, float]
 ) -> None:
-    report = result.report
     for notice in mesh.notices:
         print(f"note: {notice}")
-    for name, count in report.dirt.items():
-        print(f"note: {name.replace('_', ' ')}: {count:,}")
-    kept = {name: count for name, count in report.features.items() if count}
-    if kept:
-        print("features: " + ", ".join(f"{k.replace('_', ' ')} {n:,}" for k, n in kept.items()))
-    for way, distance in report.deviation.items():
-        print(f"deviation {way.replace('_', ' ')}: {distance:.4g}")
-    print(
-        f"target length {report.target_length:.4g}, preset {report.preset}, "
-        f"{len(report.sweeps)} sweeps in {seconds['total']:.2f} s; {report.stop}"
-    )
-    print()
-    print(side_by_side(report.quality_before, report.quality_after))
+    print(result.report)
     print()
     if options.timing:
         for name, passed in seconds.items():

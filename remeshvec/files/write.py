@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import arguments
+from ..core.check import as_array
+from ..errors import MeshInputError
 from ..interop.given import MeshObject, has_arrays, is_pair, is_whole, whole_arrays
 from ..interop.mesh_data import MeshData
 from ..interop.objects import COLOUR, MATERIAL, UV, read_object
@@ -54,16 +55,16 @@ def write_mesh(path: FilePath, V: ArrayLike | MeshObject, F: Any = None) -> None
     elif F is None and not (hasattr(V, "__array__") or isinstance(V, tuple | list)):
         data = read_object(V)  # raises, and says what this is instead
     else:
-        data = MeshData(_plain(V), _plain(F))
+        data = _mesh_data(V, F)
     with named_errors("write", path):
-        data.V, data.F = checked_arrays(_plain(data.V), _plain(data.F))
+        data.V, data.F = checked_arrays(data.V, data.F)
     write_data(path, data)
 
 
 def _whole_data(mesh: Any) -> MeshData:
     """Return a mesh with its data under the names that files use."""
     if is_pair(mesh) or has_arrays(mesh):
-        return MeshData(*map(_plain, whole_arrays(mesh)))
+        return _mesh_data(*whole_arrays(mesh))
     data = read_object(mesh)
     if hasattr(mesh, "visual"):
         return read_parts([mesh])
@@ -74,5 +75,5 @@ def _whole_data(mesh: Any) -> MeshData:
     return with_uv(data)
 
 
-def _plain(values: Any) -> Any:
-    return np.asarray(values.detach().cpu() if hasattr(values, "detach") else values)
+def _mesh_data(V: Any, F: Any) -> MeshData:
+    return MeshData(as_array(V, "V", MeshInputError), as_array(F, "F", MeshInputError))

@@ -28,7 +28,8 @@ from ..core.check import as_array
 from ..core.version import __version__
 from ..errors import OptionError, RemeshvecError
 from ..files.disk import check_writable, write_file
-from ..measures.quality import Quality, elements
+from ..measures.quality import elements
+from ..measures.record import Quality
 from ..viz.pictures import UP
 from .charts import build_charts
 from .views import build_views

@@ -10,9 +10,12 @@ from typing import Any, Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
+from ..core.shown import given_fields
+
 __all__ = [
     "MAX_FACES",
     "OPTION_NAMES",
+    "OTHER_NAMES",
     "Boundary",
     "Callback",
     "Preset",
@@ -38,7 +41,7 @@ Corners = (
 Callback = Callable[[int, str, int], Any]  # sweep, phase, count; False ends the call
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class RemeshOptions:
     """All options of `remesh`, as the caller gives them; `remesh` documents each.
 
@@ -77,6 +80,14 @@ class RemeshOptions:
     max_faces: int = MAX_FACES
     threads: int | None = None
     callback: Callback | None = None
+
+    def __repr__(self) -> str:
+        given = {
+            field.name: value
+            for field in fields(self)
+            if (value := getattr(self, field.name)) is not field.default
+        }
+        return f"RemeshOptions({', '.join(given_fields(given))})"
 
 
 class RemeshKeywords(TypedDict, total=False):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,12 @@ from numpy.typing import NDArray
 
 from ..core.arguments import choice
 from ..core.lazy import Lazy, LazyRecipe
+from ..core.shown import one_line
 from ..core.vocabulary import FloatArray, IntArray
+from ..errors import OptionError
+from ..files.data_files import write_data
+from ..files.disk import FilePath
+from ..interop.mesh_data import MeshData
 from .records import Births
 from .report import Report
 from .transfer import (
@@ -29,9 +35,9 @@ __all__ = ["RemeshResult"]
 _PLACES = ("vertices", "faces", "corners")
 
 
-@dataclass
+@dataclass(repr=False, eq=False)
 class RemeshResult:
-    """A remeshed surface; unpacks as ``V, F = result``.
+    """A remeshed surface; unpacks as ``V, F = result``, and goes wherever a mesh goes.
 
     What few callers read is computed when it is first asked for. Until then a result holds the faces
     of the input and its own once more in memory. It keeps a copy of the input, so the caller may go on to
@@ -56,18 +62,84 @@ class RemeshResult:
     report: Report
     face_labels: NDArray[Any] | None
     lengths: FloatArray
-    _births: Lazy[Births] = field(repr=False, compare=False)
-    _face_births: LazyRecipe[IntArray] = field(repr=False, compare=False)
-    _corner_births: LazyRecipe[Births] = field(repr=False, compare=False)
-    _images: LazyRecipe[Births] = field(repr=False, compare=False)
-    _vertex_map: Lazy[IntArray] = field(repr=False, compare=False)
-    _face_map: Lazy[IntArray] = field(repr=False, compare=False)
-    _feature_edges: Lazy[IntArray] = field(repr=False, compare=False)
-    _input_feature_edges: Lazy[IntArray] = field(repr=False, compare=False)
-    _corners: Lazy[IntArray] = field(repr=False, compare=False)
+    _births: Lazy[Births]
+    _face_births: LazyRecipe[IntArray]
+    _corner_births: LazyRecipe[Births]
+    _images: LazyRecipe[Births]
+    _vertex_map: Lazy[IntArray]
+    _face_map: Lazy[IntArray]
+    _feature_edges: Lazy[IntArray]
+    _input_feature_edges: Lazy[IntArray]
+    _corners: Lazy[IntArray]
 
     def __iter__(self) -> Iterator[NDArray[Any]]:
         return iter((self.V, self.F))
+
+    def __repr__(self) -> str:
+        return one_line("RemeshResult", f"{len(self.V):,} vertices", *self.report.facts())
+
+    def _repr_html_(self) -> str:
+        return self.report._repr_html_()
+
+    def summary(self) -> str:
+        """Return what happened, and the measures before and after, as a table to print."""
+        return str(self.report)
+
+    @property
+    def vertices(self) -> Any:
+        """The same as ``V``."""
+        return self.V
+
+    @property
+    def faces(self) -> Any:
+        """The same as ``F``."""
+        return self.F
+
+    def to_trimesh(self) -> Any:
+        """Return a ``trimesh.Trimesh``, with ``face_labels`` as a face attribute if there are any.
+
+        Raises
+        ------
+        OptionError
+            trimesh is not installed.
+        """
+        mesh = _library("trimesh").Trimesh(to_numpy(self.V), to_numpy(self.F), process=False)
+        mesh.face_attributes.update(self._labels())
+        return mesh
+
+    def to_pyvista(self) -> Any:
+        """Return a ``pyvista.PolyData``, with ``face_labels`` as cell data if there are any.
+
+        Raises
+        ------
+        OptionError
+            PyVista is not installed.
+        """
+        mesh = _library("pyvista").PolyData.from_regular_faces(to_numpy(self.V), to_numpy(self.F))
+        mesh.cell_data.update(self._labels())
+        return mesh
+
+    def save(self, path: FilePath) -> None:
+        """Write the mesh to a file, with ``face_labels`` if there are any and the format holds them.
+
+        Parameters
+        ----------
+        path : str or path
+            The file; its suffix gives the format, as for `write_mesh`.
+
+        Raises
+        ------
+        MeshFormatError
+            The suffix is unknown, or the file cannot be written.
+        OptionError
+            ``path`` is not a path.
+        """
+        V = np.ascontiguousarray(to_numpy(self.V), np.float64)
+        F = to_numpy(self.F).astype(np.int64)
+        write_data(path, MeshData(V, F, on_faces=self._labels()))
+
+    def _labels(self) -> dict[str, NDArray[Any]]:
+        return {} if self.face_labels is None else {"face_labels": to_numpy(self.face_labels)}
 
     def show(self, *, title: str = "", up: str = "y") -> None:
         """Show a page with both meshes, histograms and measures (the extra ``[html]``).
@@ -285,3 +357,10 @@ class RemeshResult:
 
     def _as_given(self, value: Any) -> Any:
         return in_kind_of((self.V, self.F), value)
+
+
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError:
+        raise OptionError(f"to_{name} needs {name}: pip install {name}") from None
