@@ -30,6 +30,8 @@ examples:
   remeshvec part.stl -o part.ply --feature-angle 30   keep edges that turn by more than 30 degrees
   remeshvec cat.obj -o fine.obj --adaptive 0.001      short edges where the surface is curved
 
+  remeshvec - --format ply -o - < a.ply | program     from and to other programs
+
   remeshvec batch 'in/*.obj' --out even               many meshes; see remeshvec batch --help
 
 FILE of numbers: text (white space or commas, # starts a comment) or .npy; indices count from 0.
@@ -67,8 +69,13 @@ def parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    result.add_argument("input", metavar="INPUT", help="mesh file")
-    result.add_argument("-o", "--output", metavar="OUTPUT", help="mesh file to write")
+    result.add_argument("input", metavar="INPUT", help="mesh file; - reads standard input")
+    result.add_argument(
+        "-o", "--output", metavar="OUTPUT", help="mesh file to write; - writes to standard output"
+    )
+    result.add_argument(
+        "--format", choices=[suffix[1:] for suffix in COMMON_SUFFIXES], help="format of -"
+    )
     lengths = _add_size_options(result.add_argument_group("how long edges become"))
     lengths.add_argument("--lengths", metavar="FILE", help="target edge length at every vertex")
     keep = result.add_argument_group("what to keep")

@@ -10,7 +10,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -19,12 +19,13 @@ import remeshvec
 from ..batch.one_file import with_feature_data
 from ..errors import OptionError, RemeshvecError
 from ..files.data_files import check_data_writable, read_data, write_data
-from ..files.disk import check_writable, write_file
+from ..files.disk import check_writable, format_suffix, write_file
 from ..files.mesh_files import MeshFile
-from ..interop.mesh_data import carry
+from ..interop.mesh_data import MeshData, carry
 from ..output.result import RemeshResult
 from .arguments import FILE_OPTIONS, given_options, parse, parser, target_length
 from .array_files import read_array, write_arrays
+from .streams import STREAM, check_streams, read_stream, write_stream
 
 __all__ = ["main"]
 
@@ -83,7 +84,8 @@ def _run(options: argparse.Namespace) -> int:
     _check_outputs(options)
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
-        data, notices = read_data(options.input)
+        is_stream = options.input == STREAM
+        data, notices = read_stream(options.format) if is_stream else read_data(options.input)
     mesh = MeshFile(data.V, data.F, notices)
     with _progress(options.quiet) as callback:
         result = remeshvec.remesh(
@@ -96,9 +98,10 @@ def _run(options: argparse.Namespace) -> int:
     seconds |= result.report.seconds
     if options.output:
         with _timed(seconds, "write"):
-            lost = write_data(options.output, carry(data, result))
+            lost = _write(options, carry(data, result))
         if lost:
-            notices.append(f"{Path(options.output).suffix} files cannot hold: {', '.join(lost)}")
+            kind = options.format if options.output == STREAM else format_suffix(options.output)[1:]
+            notices.append(f".{kind} files cannot hold: {', '.join(lost)}")
     if options.save_stats:
         _save_stats(options, mesh, result)
     if options.save_arrays:
@@ -108,7 +111,9 @@ def _run(options: argparse.Namespace) -> int:
     if options.html:
         _write_page(options, result)
     if not options.quiet:
-        _print_report(options, mesh, result, seconds)
+        # Standard output is the mesh alone if it is written there.
+        with redirect_stdout(sys.stderr if options.output == STREAM else sys.stdout):
+            _print_report(options, mesh, result, seconds)
     if options.visualize:
         from .. import viz
 
@@ -119,7 +124,8 @@ def _run(options: argparse.Namespace) -> int:
 
 def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written or shown, before the work starts."""
-    if options.output:
+    check_streams(options)
+    if options.output and options.output != STREAM:
         check_data_writable(options.output)
     for path in (options.save_stats, options.save_arrays):
         if path:
@@ -140,6 +146,13 @@ def _check_outputs(options: argparse.Namespace) -> None:
         raise OptionError("two outputs have the same name; give each output its own")
     if os.path.realpath(options.input) in paths[bool(options.output) :]:
         raise OptionError(f"an output beside the mesh would replace the input {options.input}")
+
+
+def _write(options: argparse.Namespace, data: MeshData) -> list[str]:
+    """Write the mesh; returns the names of data that the format cannot hold."""
+    if options.output == STREAM:
+        return write_stream(options.format, data)
+    return write_data(options.output, data)
 
 
 def _outputs(options: argparse.Namespace) -> list[str]:

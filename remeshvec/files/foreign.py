@@ -15,6 +15,7 @@ from ..interop.mesh_data import MeshData, with_data_at_vertices, with_uv_at_corn
 from ..interop.meshio_data import read_meshio, write_meshio
 from ..interop.objects import read_pyvista
 from ..processes.pool import StandingWorker
+from .disk import checked_bytes, format_suffix
 from .scene import read_scene, scene_bytes
 from .vtk_materials import material_fields, read_materials, with_fields
 
@@ -98,14 +99,20 @@ def read_foreign(path: Path) -> tuple[MeshData, list[str]]:
     WorkerError
         The library took too long, or its process died.
     """
-    name, _ = _library(path.suffix.lower())
-    limit = _SECONDS + path.stat().st_size // _BYTES_PER_SECOND
-    return _reader((name, path.resolve()), limit)
+    suffix = format_suffix(path)
+    name, _ = _library(suffix)
+    with tempfile.TemporaryDirectory(prefix="remeshvec-") as folder:
+        plain = path.resolve()
+        if suffix != path.suffix.lower():
+            plain = Path(folder) / f"mesh{suffix}"
+            plain.write_bytes(checked_bytes(path))
+        limit = _SECONDS + plain.stat().st_size // _BYTES_PER_SECOND
+        return _reader((name, plain, path.resolve().parent), limit)
 
 
-def _read_here(task: tuple[str, Path], _: None) -> tuple[MeshData, list[str]]:
-    """Read in this process."""
-    name, path = task
+def _read_here(task: tuple[str, Path, Path], _: None) -> tuple[MeshData, list[str]]:
+    """Read in this process; materials are looked for in the folder that comes last."""
+    name, path, folder = task
     library = importlib.import_module(name)
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)  # pyvista reports errors of VTK as warnings
@@ -120,7 +127,7 @@ def _read_here(task: tuple[str, Path], _: None) -> tuple[MeshData, list[str]]:
     data.wrap = None
     if name != "trimesh":
         data = with_uv(data)
-        read_materials(data, found.field_data, path.parent)
+        read_materials(data, found.field_data, folder)
     return data, [str(warning.message) for warning in noticed]
 
 
@@ -149,7 +156,7 @@ def with_uv(data: MeshData) -> MeshData:
 
 def write_foreign(path: Path, data: MeshData) -> tuple[bytes, set[str]]:
     """Return a file as the library that knows its suffix writes it, and the names of data in it."""
-    suffix = path.suffix.lower()
+    suffix = format_suffix(path)
     name, library = _library(suffix)
     held = {*data.on_vertices, *data.on_faces, *data.on_corners}
     data = with_data_at_vertices(data)

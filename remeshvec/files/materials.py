@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..interop.mesh_data import MeshData
-from .disk import check_regular, write_file
+from .disk import check_regular, format_suffix, write_file
 
 __all__ = [
     "WHITE",
@@ -113,12 +113,12 @@ def with_library(data: MeshData, path: Path) -> MeshData:
         A file cannot be written.
     """
     own = data.extra.get("materials")
-    if "mtllib" in data.extra or not own:
+    if "mtllib" in data.extra or not own or "material" not in data.on_faces:
         return data
-    if path.suffix.lower() == ".ply" and all(map(_is_image_file, own)):
+    if format_suffix(path) == ".ply" and all(map(_is_image_file, own)):
         return data  # PLY names images itself
     materials = [_with_image_file(material, path) for material in own]
-    library = _place(path.with_suffix(".mtl"), _library_bytes(materials, path))
+    library = _place(_beside(path, ".mtl"), _library_bytes(materials, path))
     return replace(data, extra={**data.extra, "materials": materials, "mtllib": [str(library)]})
 
 
@@ -198,8 +198,14 @@ def _with_image_file(material: Material, path: Path) -> Material:
     """Write the image of a material that is in no file."""
     if not isinstance(material.image, bytes):
         return material
-    name = path.with_suffix(_suffix(material.image) or ".png")
+    name = _beside(path, _suffix(material.image) or ".png")
     return replace(material, image=_place(name, material.image))
+
+
+def _beside(path: Path, suffix: str) -> Path:
+    """Name a file beside a mesh file after it."""
+    plain = path.with_suffix("") if path.suffix.lower() == ".gz" else path
+    return plain.with_suffix(suffix)
 
 
 def _place(path: Path, content: bytes) -> Path:

@@ -33,7 +33,7 @@ def write_mesh(path: FilePath, V: ArrayLike | MeshObject, F: Any = None) -> None
     Parameters
     ----------
     path : str or path
-        The file; its suffix gives the format.
+        The file; its suffix gives the format. It is packed if ``.gz`` follows.
     V : (n, 3) float, or a mesh
         Vertex positions. Or a whole mesh as for `remesh`, or a result: objects are written with their
         colours, texture coordinates, materials and fields, as far as the format holds them.
