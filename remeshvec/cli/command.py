@@ -52,9 +52,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         from . import batch_command as _batch_command
 
         return _ends(_batch_command.run, _batch_command.parsed(words[1:]))
+    if words[:1] == ["completions"]:
+        return _show_completions(words[1:])
     options = parse(parser(), words)
     options.call = shlex.join(["remeshvec", *words])
     return _ends(_run, options)
+
+
+def _show_completions(words: list[str]) -> int:
+    """Print what a shell reads to complete flags."""
+    from . import completions
+
+    if len(words) != 1 or words[0] not in completions.SHELLS:
+        shells = " or ".join(completions.SHELLS)
+        return _failed(f"completions are for one shell: {shells}", EXIT_ERROR)
+    print(completions.completion_script(words[0]), end="")
+    return 0
 
 
 def _ends(work: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
