@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from remeshvec import RemeshResult, quality, surface_distance
-from remeshvec.measures.quality import Quality
+from remeshvec.measures.record import Quality
 
 from .meshes import FloatArray, IntArray, Sample
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from remeshvec.files.mesh_files import read_mesh, write_mesh
+from remeshvec import read_mesh, write_mesh
 
 from .meshes import FloatArray, IntArray
 

@@ -7,20 +7,22 @@ import sys
 from pathlib import Path
 
 from benchmarks.tables import table
-from remeshvec.cli.arguments import parser
+from remeshvec.cli.arguments import batch_parser, parser
 
 PAGE = Path(__file__).with_name("command-line.md")
 HEADING = "## All flags\n"
+BATCH = "## All flags of `remeshvec batch`\n"
 
 
 def with_flags(text: str) -> str:
     """Return the page with everything below its heading of flags made anew."""
-    return text.partition(HEADING)[0] + HEADING + "\n" + _tables() + "\n"
+    before = text.partition(HEADING)[0]
+    return f"{before}{HEADING}\n{_tables(parser())}\n\n{BATCH}\n{_tables(batch_parser())}\n"
 
 
-def _tables() -> str:
+def _tables(of: argparse.ArgumentParser) -> str:
     parts = []
-    for group in parser()._action_groups:
+    for group in of._action_groups:
         rows = [[_flag(a), _about(a)] for a in group._group_actions if a.option_strings]
         if rows:
             title = "general" if group.title in ("options", "optional arguments") else group.title

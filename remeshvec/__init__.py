@@ -16,9 +16,11 @@ from .errors import (
     SingularSystemError,
     WorkerError,
 )
-from .files.mesh_files import MeshFile, read_mesh, write_mesh
+from .files.mesh_files import MeshFile, read_mesh
+from .files.write import write_mesh
 from .measures.distance import SurfaceDistance, surface_distance
-from .measures.quality import Quality, quality
+from .measures.quality import quality
+from .measures.record import Quality
 from .output.defects import Defects
 from .output.light import LightResult
 from .output.report import Report

@@ -219,6 +219,13 @@ TABLE = {
     RemeshResult.show: Entry(
         {"title": NOT_TEXTS, "up": NOT_WORDS}, lambda: {"self": result()}
     ),
+    RemeshResult.summary: Entry({}, lambda: {"self": result()}),
+    RemeshResult.to_trimesh: Entry({}, lambda: {"self": result()}),
+    RemeshResult.to_pyvista: Entry({}, lambda: {"self": result()}),
+    RemeshResult.save: Entry(
+        {"path": [*NOT_PATHS, "", ".", "absent/a.obj", "a\0.obj", "a.txt"]},
+        lambda: {"self": result(), "path": "a.obj"},
+    ),
     RemeshResult.transfer: Entry(
         {"values": NOT_VALUES, "on": NOT_WORDS, "method": NOT_WORDS},
         lambda: {"self": result(), "values": V},

@@ -23,7 +23,7 @@ def is_there(package):
 def site(tmp_path_factory):
     absent = [package for package in NEEDED if not is_there(package)]
     if absent:
-        pytest.skip(f"the site needs {', '.join(absent)}: pip install 'remeshvec[docs]'")
+        pytest.skip(f"the site needs {', '.join(absent)}: pip install '.[docs]'")
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", f"{folder}/trees"]
     done = subprocess.run(

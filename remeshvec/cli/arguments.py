@@ -15,6 +15,7 @@ from ..files.mesh_files import MeshFile
 from ..input.options import OPTION_NAMES, Boundary, Preset
 from ..measures.quality import quality
 from ..sizing.adaptive import Adaptive
+from .parser import OneLineParser
 
 __all__ = ["FILE_OPTIONS", "batch_parser", "given_options", "parse", "parser", "target_length"]
 
@@ -30,7 +31,7 @@ examples:
   remeshvec cat.obj -o fine.obj --adaptive 0.001      short edges where the surface is curved
   remeshvec scan.stl -o clean.ply --keep-largest --fill-holes 100 --denoise 20
                                                       one clean, closed surface of a raw one
-
+  remeshvec - --format ply -o - < a.ply | program     from and to other programs
   remeshvec batch 'in/*.obj' --out even               many meshes; see remeshvec batch --help
 
 FILE of numbers: text (white space or commas, # starts a comment) or .npy; indices count from 0.
@@ -60,7 +61,7 @@ FILE_OPTIONS = {
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the shell command's arguments."""
-    result = argparse.ArgumentParser(
+    result = OneLineParser(
         prog="remeshvec",
         description="Remesh a triangle mesh to even triangles.\n"
         "Reads and writes OBJ, OFF, PLY, STL, and JSON with the keys verts and faces; and the formats\n"
@@ -69,8 +70,13 @@ def parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    result.add_argument("input", metavar="INPUT", help="mesh file")
-    result.add_argument("-o", "--output", metavar="OUTPUT", help="mesh file to write")
+    result.add_argument("input", metavar="INPUT", help="mesh file; - reads standard input")
+    result.add_argument(
+        "-o", "--output", metavar="OUTPUT", help="mesh file to write; - writes to standard output"
+    )
+    result.add_argument(
+        "--format", choices=[suffix[1:] for suffix in COMMON_SUFFIXES], help="format of -"
+    )
     _add_repair_options(result.add_argument_group("what to repair first"))
     lengths = _add_size_options(result.add_argument_group("how long edges become"))
     lengths.add_argument("--lengths", metavar="FILE", help="target edge length at every vertex")
@@ -84,7 +90,7 @@ def parser() -> argparse.ArgumentParser:
 
 def batch_parser() -> argparse.ArgumentParser:
     """Return the parser of ``remeshvec batch``: all arguments except elements of a single mesh."""
-    result = argparse.ArgumentParser(
+    result = OneLineParser(
         prog="remeshvec batch",
         description="Remesh many triangle meshes, several at a time.",
         epilog=BATCH_EPILOG,
@@ -382,16 +388,22 @@ def _add_report_options(group: argparse._ArgumentGroup) -> None:
 
 
 def _positive_number(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
     if not (value > 0 and math.isfinite(value)):
         raise argparse.ArgumentTypeError(f"{text} is not a positive number")
     return value
 
 
 def _at_least_one(text: str) -> int:
-    value = int(text)
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
     if value < 1:
-        raise argparse.ArgumentTypeError(f"{text} is less than 1")
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number, at least 1")
     return value
 
 

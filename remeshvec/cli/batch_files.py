@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from ..errors import OptionError
 from ..files.data_files import COMMON_SUFFIXES
+from ..files.disk import format_suffix
 
 __all__ = ["FileJob", "find_jobs", "refuse_collisions"]
 
@@ -61,7 +62,10 @@ def find_jobs(
     jobs: dict[str, FileJob] = {}
     for path, _ in found:
         name = Path(os.path.relpath(os.path.abspath(path), root))
-        output = (name if suffix is None else name.with_suffix(suffix)).as_posix()
+        if suffix is not None:
+            plain = name.with_suffix("") if name.suffix.lower() == ".gz" else name
+            name = plain.with_suffix(suffix)
+        output = name.as_posix()
         jobs.setdefault(os.path.realpath(path), FileJob(path, output, os.path.join(folder, output)))
     return list(jobs.values())
 
@@ -75,9 +79,7 @@ def _files(pattern: str, made: Collection[str]) -> list[_Found]:
         )
     names = sorted(glob.glob(pattern, recursive=True))
     files = [
-        name
-        for name in names
-        if Path(name).suffix.lower() in COMMON_SUFFIXES and os.path.isfile(name)
+        name for name in names if format_suffix(name) in COMMON_SUFFIXES and os.path.isfile(name)
     ]
     if not files:
         raise OptionError(f"{pattern}: there is no such mesh file")

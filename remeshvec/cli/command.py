@@ -10,7 +10,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -19,14 +19,14 @@ import remeshvec
 from ..batch.one_file import with_feature_data
 from ..errors import OptionError, RemeshvecError
 from ..files.data_files import check_data_writable, read_data, write_data
-from ..files.disk import check_writable, write_file
+from ..files.disk import check_writable, format_suffix, write_file
 from ..files.mesh_files import MeshFile
-from ..interop.mesh_data import carry
-from ..measures.quality import side_by_side
+from ..interop.mesh_data import MeshData, carry
 from ..output.result import RemeshResult
 from .arguments import FILE_OPTIONS, given_options, parse, parser, target_length
 from .array_files import read_array, write_arrays
 from .repair_step import check_repair, is_asked_for, repaired
+from .streams import STREAM, check_streams, read_stream, write_stream
 
 __all__ = ["main"]
 
@@ -53,9 +53,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         from . import batch_command as _batch_command
 
         return _ends(_batch_command.run, _batch_command.parsed(words[1:]))
+    if words[:1] == ["completions"]:
+        return _show_completions(words[1:])
     options = parse(parser(), words)
     options.call = shlex.join(["remeshvec", *words])
     return _ends(_run, options)
+
+
+def _show_completions(words: list[str]) -> int:
+    """Print what a shell reads to complete flags."""
+    from . import completions
+
+    if len(words) != 1 or words[0] not in completions.SHELLS:
+        shells = " or ".join(completions.SHELLS)
+        return _failed(f"completions are for one shell: {shells}", EXIT_ERROR)
+    print(completions.completion_script(words[0]), end="")
+    return 0
 
 
 def _ends(work: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
@@ -85,7 +98,8 @@ def _run(options: argparse.Namespace) -> int:
     _check_outputs(options)
     seconds: dict[str, float] = {}
     with _timed(seconds, "read"):
-        data, notices = read_data(options.input)
+        is_stream = options.input == STREAM
+        data, notices = read_stream(options.format) if is_stream else read_data(options.input)
     raw = MeshFile(data.V, data.F, notices)
     with _timed(seconds, "repair"):
         data, repairs = repaired(options, data)
@@ -103,9 +117,10 @@ def _run(options: argparse.Namespace) -> int:
     seconds |= result.report.seconds
     if options.output:
         with _timed(seconds, "write"):
-            lost = write_data(options.output, carry(data, result))
+            lost = _write(options, carry(data, result))
         if lost:
-            notices.append(f"{Path(options.output).suffix} files cannot hold: {', '.join(lost)}")
+            kind = options.format if options.output == STREAM else format_suffix(options.output)[1:]
+            notices.append(f".{kind} files cannot hold: {', '.join(lost)}")
     if options.save_stats:
         _save_stats(options, mesh, result)
     if options.save_arrays:
@@ -115,7 +130,9 @@ def _run(options: argparse.Namespace) -> int:
     if options.html:
         _write_page(options, result)
     if not options.quiet:
-        _print_report(options, mesh, result, seconds)
+        # Standard output is the mesh alone if it is written there.
+        with redirect_stdout(sys.stderr if options.output == STREAM else sys.stdout):
+            _print_report(options, mesh, result, seconds)
     if options.visualize:
         from .. import viz
 
@@ -127,7 +144,8 @@ def _run(options: argparse.Namespace) -> int:
 def _check_outputs(options: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written or shown, before the work starts."""
     check_repair(options)
-    if options.output:
+    check_streams(options)
+    if options.output and options.output != STREAM:
         check_data_writable(options.output)
     for path in (options.save_stats, options.save_arrays):
         if path:
@@ -148,6 +166,13 @@ def _check_outputs(options: argparse.Namespace) -> None:
         raise OptionError("two outputs have the same name; give each output its own")
     if os.path.realpath(options.input) in paths[bool(options.output) :]:
         raise OptionError(f"an output beside the mesh would replace the input {options.input}")
+
+
+def _write(options: argparse.Namespace, data: MeshData) -> list[str]:
+    """Write the mesh; returns the names of data that the format cannot hold."""
+    if options.output == STREAM:
+        return write_stream(options.format, data)
+    return write_data(options.output, data)
 
 
 def _outputs(options: argparse.Namespace) -> list[str]:
@@ -265,22 +290,9 @@ def _plain(value: Any) -> Any:
 def _print_report(
     options: argparse.Namespace, mesh: MeshFile, result: RemeshResult, seconds: dict[str, float]
 ) -> None:
-    report = result.report
     for notice in mesh.notices:
         print(f"note: {notice}")
-    for name, count in report.dirt.items():
-        print(f"note: {name.replace('_', ' ')}: {count:,}")
-    kept = {name: count for name, count in report.features.items() if count}
-    if kept:
-        print("features: " + ", ".join(f"{k.replace('_', ' ')} {n:,}" for k, n in kept.items()))
-    for way, distance in report.deviation.items():
-        print(f"deviation {way.replace('_', ' ')}: {distance:.4g}")
-    print(
-        f"target length {report.target_length:.4g}, preset {report.preset}, "
-        f"{len(report.sweeps)} sweeps in {seconds['total']:.2f} s; {report.stop}"
-    )
-    print()
-    print(side_by_side(report.quality_before, report.quality_after))
+    print(result.report)
     print()
     if options.timing:
         for name, passed in seconds.items():

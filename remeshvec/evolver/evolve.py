@@ -22,7 +22,7 @@ from ..core.arguments import (
 from ..core.vocabulary import FloatArray, IntArray
 from ..errors import MeshFormatError, OptionError
 from ..files.disk import reason
-from ..files.mesh_files import write_mesh
+from ..files.write import write_mesh
 from .minimize import Minimum, minimize, unmoved
 from .problem import VOLUMES, CapillaryProblem, as_problem, is_held
 from .reshape import remeshed, with_cut_necks, without_crumbs, without_parts

@@ -18,12 +18,14 @@ from .disk import (
     check_regular,
     check_writable,
     checked_bytes,
+    format_suffix,
     named_errors,
     reason,
     write_file,
 )
 from .foreign import can_write, read_foreign, write_foreign
-from .mesh_files import SUFFIXES, read_mesh, write_mesh
+from .materials import known_materials, with_library
+from .mesh_files import SUFFIXES, array_bytes, read_mesh
 from .obj import OBJ_DATA, ObjFile, obj_bytes
 from .ply import PlyFile, ply_bytes
 from .polygon_mesh import check_polygons, triangulated
@@ -31,10 +33,14 @@ from .polygon_mesh import check_polygons, triangulated
 __all__ = [
     "COMMON_SUFFIXES",
     "check_data_writable",
+    "check_format_writable",
+    "data_bytes",
     "read_data",
     "write_data",
 ]
 
+WITH_LIBRARY = (".obj", ".ply", ".vtp", ".vtu")  # name a material library beside them
+WITH_IMAGES = (".glb", ".gltf")
 # Suffixes that patterns match; files with other suffixes are read if they are named.
 COMMON_SUFFIXES = (*SUFFIXES, ".vtk", ".vtu", ".vtp", ".msh", ".xdmf", ".glb", ".gltf")
 
@@ -50,7 +56,7 @@ def read_data(path: FilePath) -> tuple[MeshData, list[str]]:
         ``path`` is not a path.
     """
     path = Path(arguments.path(path, "path"))
-    suffix = path.suffix.lower()
+    suffix = format_suffix(path)
     with named_errors("read", path):
         if suffix == ".obj":
             return _read_own(ObjFile(checked_bytes(path)), path)
@@ -86,8 +92,19 @@ def check_data_writable(path: FilePath, suffixes: Sequence[str] = ()) -> None:
     OptionError
         ``path`` is not a path.
     """
-    suffix = Path(arguments.path(path, "path")).suffix.lower()
+    arguments.path(path, "path")
     check_writable(path, suffixes)
+    check_format_writable(path)
+
+
+def check_format_writable(path: FilePath) -> None:
+    """Refuse a format that no library here writes.
+
+    Raises
+    ------
+    MeshFormatError
+    """
+    suffix = format_suffix(path)
     obstacle = None if suffix in SUFFIXES else can_write(suffix)
     if obstacle:
         raise MeshFormatError(f"cannot write {path}: {obstacle}")
@@ -110,17 +127,47 @@ def write_data(path: FilePath, data: MeshData) -> list[str]:
     """
     path = Path(arguments.path(path, "path"))
     arguments.instance(data, "data", MeshData, "a MeshData")
-    suffix = path.suffix.lower()
-    carried = {*data.on_vertices, *data.on_faces, *data.on_corners}
-    if suffix in SUFFIXES and (suffix not in (".obj", ".ply") or not carried):
-        write_mesh(path, data.V, data.F)
-        return sorted(carried)
     with named_errors("write", path):
-        if suffix == ".obj":
+        if format_suffix(path) in WITH_LIBRARY:
+            data = with_library(data, path)
+    content, lost = data_bytes(path, data)
+    write_file(path, content)
+    return lost
+
+
+def data_bytes(path: Path, data: MeshData) -> tuple[bytes, list[str]]:
+    """Return the content of a file of a mesh with its data, and the names of data that it cannot hold.
+
+    Parameters
+    ----------
+    path : Path
+        Its suffix gives the format; libraries and images are named as seen from its folder.
+    data : MeshData
+
+    Raises
+    ------
+    MeshFormatError
+        The mesh cannot be written in this format.
+    """
+    suffix = format_suffix(path)
+    carried = {*data.on_vertices, *data.on_faces, *data.on_corners}
+    with named_errors("write", path):
+        if suffix in SUFFIXES and (suffix not in (".obj", ".ply") or not carried):
+            content, held = array_bytes(path, data.V, data.F), set()
+        elif suffix == ".obj":
             content, held = obj_bytes(data, path), {*OBJ_DATA}
         elif suffix == ".ply":
-            content, held = ply_bytes(data), carried - (set(data.on_corners) - {"uv"})
+            content, held = ply_bytes(data, path), carried - (set(data.on_corners) - {"uv"})
         else:
             content, held = write_foreign(path, data)
-    write_file(path, content)
-    return sorted(carried - held)
+    return content, sorted((carried - held) | _lost_images(data, suffix))
+
+
+def _lost_images(data: MeshData, suffix: str) -> set[str]:
+    """Name the images of materials, if a file can neither hold nor name one of them."""
+    if suffix in WITH_IMAGES or (suffix in WITH_LIBRARY and "mtllib" in data.extra):
+        return set()
+    images = [material.image for material in known_materials(data)]
+    kept = Path if suffix == ".ply" else ()  # which names files itself
+    has_lost = any(image is not None and not isinstance(image, kept) for image in images)
+    return {"images of materials"} if has_lost else set()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import gzip
+import io
 import json
 import os
 import re
 import secrets
 import shutil
 import stat
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -20,8 +23,10 @@ __all__ = [
     "check_regular",
     "check_writable",
     "checked_bytes",
+    "format_suffix",
     "named_errors",
     "reason",
+    "unpacked",
     "write_file",
 ]
 
@@ -75,8 +80,38 @@ def check_regular(path: Path) -> None:
         raise ValueError("it is not a regular file")
 
 
+def format_suffix(path: FilePath) -> str:
+    """Return the suffix that tells the format, in lower case: ``.obj`` for ``a.OBJ`` and ``a.obj.gz``."""
+    name = Path(path)
+    return Path(name.stem if _is_packed(name) else name).suffix.lower()
+
+
+def _is_packed(path: Path) -> bool:
+    return path.suffix.lower() == ".gz"
+
+
+def unpacked(data: bytes) -> bytes:
+    """Return the content of a gzip file, up to the largest size that is read.
+
+    Raises
+    ------
+    ValueError
+        The file is damaged, or its content is too large.
+    """
+    try:
+        with gzip.open(io.BytesIO(data)) as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise ValueError(f"it is not a complete gzip file: {error}") from None
+    if len(content) > MAX_BYTES:
+        raise ValueError(f"it unpacks to more than {MAX_BYTES:,} bytes, the limit")
+    return content
+
+
 def checked_bytes(path: Path) -> bytes:
     """Return the content of a regular file, not too large, whose format matches its suffix.
+
+    Files whose names end with ``.gz`` are unpacked.
 
     Raises
     ------
@@ -89,16 +124,18 @@ def checked_bytes(path: Path) -> bytes:
     if size > MAX_BYTES:
         raise ValueError(f"it has {size:,} bytes; the limit is {MAX_BYTES:,}")
     data = path.read_bytes()
+    if _is_packed(path):
+        data = unpacked(data)
     if not data.strip():
         raise ValueError("it is empty")
-    _check_suffix(data, path.suffix.lower())
+    _check_suffix(data, format_suffix(path))
     return data
 
 
 def _check_suffix(data: bytes, suffix: str) -> None:
     """Refuse content that is clearly in another format than that of the suffix."""
     if data[:2] == b"\x1f\x8b" or data[:4] == b"PK\x03\x04":
-        raise ValueError("it is compressed; unpack it first")
+        raise ValueError("it is compressed; unpack it first, or name it .gz")
     found = _format_of(data)
     if found and found != suffix and not (suffix == ".stl" and b"\0" in data):
         raise ValueError(f"the content is {found[1:].upper()}, not {suffix[1:].upper()}")
@@ -121,7 +158,8 @@ def _format_of(data: bytes) -> str | None:
 def write_file(path: FilePath, content: bytes) -> None:
     """Write a temporary file beside the target, then rename it: nobody sees a half-written file.
 
-    The content reaches the disk before the name, so this holds even after a loss of power.
+    The content reaches the disk before the name, so this holds even after a loss of power. It is packed
+    if the name ends with ``.gz``, without a time, so that the same content gives the same bits.
 
     Raises
     ------
@@ -130,6 +168,8 @@ def write_file(path: FilePath, content: bytes) -> None:
     """
     with named_errors("write", Path(arguments.path(path, "path"))):
         target = Path(path).resolve()  # a link stays a link
+        if _is_packed(Path(path)):
+            content = gzip.compress(content, 6, mtime=0)
         part = target.with_name(f".{secrets.token_hex(8)}.part")
         try:
             with open(part, "xb") as file:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..core import arguments
 from ..core.vocabulary import FloatArray, IntArray
 from ..interop.mesh_data import MeshData
-from .disk import FilePath, checked_bytes, named_errors, write_file
+from .disk import FilePath, checked_bytes, format_suffix, named_errors
 from .json_format import json_bytes, parse_json
 from .obj import ObjFile, obj_bytes
 from .off import off_bytes, parse_off
@@ -24,7 +24,7 @@ from .ply import PlyFile, ply_bytes
 from .polygon_mesh import PolygonMesh, check_polygons, triangulated
 from .stl import parse_stl, stl_bytes
 
-__all__ = ["SUFFIXES", "MeshFile", "read_mesh", "write_mesh"]
+__all__ = ["SUFFIXES", "MeshFile", "array_bytes", "checked_arrays", "read_mesh"]
 
 
 class MeshFile(NamedTuple):
@@ -56,7 +56,7 @@ def read_mesh(path: FilePath) -> MeshFile:
     Parameters
     ----------
     path : str or path
-        The file; its suffix gives the format, in upper or lower case.
+        The file; its suffix gives the format, in upper or lower case. ``.gz`` after it is unpacked.
 
     Returns
     -------
@@ -78,43 +78,26 @@ def read_mesh(path: FilePath) -> MeshFile:
         return MeshFile(np.ascontiguousarray(mesh.V), triangles.F, triangles.notices)
 
 
-def write_mesh(path: FilePath, V: ArrayLike, F: ArrayLike) -> None:
-    """Write a triangle mesh to an OBJ, OFF, PLY, STL or JSON file.
-
-    All formats but STL keep every bit of float64 coordinates; STL (binary) holds float32. A file
-    of this name is replaced when the new one is complete, and stays as it is if anything fails.
-
-    Parameters
-    ----------
-    path : str or path
-        The file; its suffix gives the format.
-    V : (n, 3) float
-        Vertex positions.
-    F : (m, 3) int
-        Faces, 0-based.
+def array_bytes(path: Path, V: ArrayLike, F: ArrayLike) -> bytes:
+    """Return a file of a mesh without data, in one of the package's own formats.
 
     Raises
     ------
-    MeshFormatError
-        The suffix is unknown, the mesh is not valid, or the file cannot be written.
-    OptionError
-        ``path`` is not a path.
+    ValueError
+        The suffix is unknown, or the mesh is not valid.
     """
-    path = Path(arguments.path(path, "path"))
-    with named_errors("write", path):
-        to_bytes = _WRITERS[_known_suffix(path)]
-        content = to_bytes(*_checked_arrays(np.asarray(V), np.asarray(F)), path)
-    write_file(path, content)
+    to_bytes = _WRITERS[_known_suffix(path)]
+    return to_bytes(*checked_arrays(np.asarray(V), np.asarray(F)), path)
 
 
 def _known_suffix(path: Path) -> str:
-    suffix = path.suffix.lower()
+    suffix = format_suffix(path)
     if suffix not in SUFFIXES:
-        raise ValueError(f"the suffix {path.suffix!r} is not one of {', '.join(SUFFIXES)}")
+        raise ValueError(f"the suffix {suffix!r} is not one of {', '.join(SUFFIXES)}")
     return suffix
 
 
-def _checked_arrays(V: NDArray, F: NDArray) -> tuple[FloatArray, IntArray]:
+def checked_arrays(V: NDArray, F: NDArray) -> tuple[FloatArray, IntArray]:
     """Refuse arrays that are not a triangle mesh."""
     if V.ndim != 2 or V.shape[1] != 3 or len(V) == 0:
         raise ValueError(f"vertices of shape (n, 3) are needed, not {V.shape}")
@@ -139,7 +122,7 @@ _PARSERS: dict[str, Callable[[bytes], PolygonMesh]] = {
 _WRITERS: dict[str, Callable[[FloatArray, IntArray, Path], bytes]] = {
     ".obj": lambda V, F, path: obj_bytes(MeshData(V, F), path),
     ".off": lambda V, F, _: off_bytes(V, F),
-    ".ply": lambda V, F, _: ply_bytes(MeshData(V, F)),
+    ".ply": lambda V, F, path: ply_bytes(MeshData(V, F), path),
     ".stl": lambda V, F, _: stl_bytes(V, F),
     ".json": lambda V, F, _: json_bytes(V, F),
 }

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..core.vocabulary import FloatArray, IntArray
 from ..interop.mesh_data import MeshData
 from ..mesh.polygons import fan_triangles
+from .materials import in_line, relative
 from .polygon_mesh import PolygonMesh, Triangles
 from .text import floats, integers, number_table, points, shown, text_lines, word_counts
 
@@ -35,7 +36,6 @@ _KEYWORD = re.compile(
     "deg|bmat|step|cstype|curv2?|surf|parm|trim|hole|scrv|sp|end|con|[cs]tech"
 )
 _CORNER = re.compile(rb"(-?\d{1,9})(?:/(-?\d*)(?:/-?\d*)?)?")
-_NOT_IN_NAMES = re.compile(r"[\r\n\0#]")
 _ABSENT = (None, b"", b"-")  # a corner without texture coordinate
 
 
@@ -219,7 +219,7 @@ def obj_bytes(data: MeshData, path: Path) -> bytes:
     if colours is not None and colours.dtype.kind == "u":
         colours = colours / np.iinfo(colours.dtype).max
     points = data.V if colours is None else np.column_stack([data.V, colours[:, :3]])
-    lines = [f"mtllib {_in_line(_relative(lib, path))}" for lib in data.extra.get("mtllib", [])]
+    lines = [f"mtllib {in_line(relative(lib, path))}" for lib in data.extra.get("mtllib", [])]
     lines += _statements("v", np.asarray(points, float))
     F = data.F + 1
     if "uv" in data.on_corners:
@@ -251,16 +251,4 @@ def _add_parts(faces: list[str], data: MeshData) -> None:
             label = int(part[f])
             if names is None or 0 <= label < len(names):
                 name = str(label) if names is None else names[label]
-                faces[f] = f"{keyword} {_in_line(name)}\n{faces[f]}"
-
-
-def _in_line(name: str) -> str:
-    """Return a name on one line, so that the next statement is still read."""
-    return _NOT_IN_NAMES.sub(" ", name).rstrip("\\ \t")
-
-
-def _relative(target: str, path: Path) -> str:
-    try:
-        return Path(os.path.relpath(target, os.path.dirname(os.path.realpath(path)))).as_posix()
-    except ValueError:  # on another drive
-        return target
+                faces[f] = f"{keyword} {in_line(name)}\n{faces[f]}"

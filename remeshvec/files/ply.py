@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..interop.mesh_data import Data, MeshData
+from ..interop.mesh_data import Data, MeshData, with_data_at_vertices, with_uv_at_corners
 from ..mesh.polygons import fan_triangles
 from .ply_header import TYPE_NAMES, parse_header
+from .ply_materials import read_materials, written_materials
 from .ply_tables import PlyTable, read_tables
 from .polygon_mesh import PolygonMesh, Triangles
 from .text import floats, shown
@@ -24,7 +25,8 @@ _VECTORS: dict[str, list[tuple[str, ...]]] = {
     "uv": [("s", "t"), ("u", "v"), ("texture_u", "texture_v")],
 }
 _INDEX_LISTS = ("vertex_indices", "vertex_index")
-_FEATURES = ("uv", "texnumber", "material_index")
+_FEATURES = ("uv", "texnumber", "material_index", "material")
+_AT_VERTICES = "uv at vertices"  # so that a file gets its texture coordinates where they were
 
 
 class PlyFile:
@@ -61,8 +63,16 @@ class PlyFile:
             [],
         )
 
-    def data(self, V: NDArray[Any], triangles: Triangles, _: Path) -> MeshData:
+    def data(self, V: NDArray[Any], triangles: Triangles, folder: Path) -> MeshData:
         """Return the mesh with all other properties of its vertices and faces.
+
+        Parameters
+        ----------
+        V : (n, 3)
+        triangles : Triangles
+            The polygons, cut.
+        folder : Path
+            Folder that names of images and material libraries are relative to.
 
         Raises
         ------
@@ -77,11 +87,14 @@ class PlyFile:
         uv = self._texture_coordinates()
         if uv is not None:
             data.on_corners["uv"] = uv
+        elif "uv" in data.on_vertices:
+            data = with_uv_at_corners(data, "uv")
+            data.extra[_AT_VERTICES] = True
+        if data.on_vertices or data.on_faces or data.on_corners:
+            read_materials(data, self._header.comments, folder)
         names = [*data.on_vertices, *data.on_faces, *data.on_corners]
         data.feature_data = tuple(name for name in _FEATURES if name in names)
         data.directions = ("normal",) if "normal" in data.on_vertices else ()
-        if names:
-            data.extra["comments"] = self._header.comments
         return data
 
     def _columns(self, element: str, table: PlyTable) -> Data:
@@ -139,19 +152,22 @@ def _join_vectors(columns: Data, into: Data, extra: dict[str, Any]) -> None:
     into |= rest
 
 
-def ply_bytes(data: MeshData) -> bytes:
+def ply_bytes(data: MeshData, path: Path) -> bytes:
     """Write a binary file: a mesh, all data on vertices and faces, texture coordinates on corners."""
+    if _AT_VERTICES in data.extra:
+        data = with_data_at_vertices(data)
+    comments, on_faces = written_materials(data, path)
     vertex = {axis: data.V[:, i] for i, axis in enumerate("xyz")}
     vertex |= _scalars(data.on_vertices, data.extra)
     lists = {"vertex_indices": data.F.astype(np.int32)}
     if "uv" in data.on_corners:
         lists["texcoord"] = data.on_corners["uv"].reshape(len(data.F), 6).astype(np.float64)
-    comments = [f"comment {line}" for line in data.extra.get("comments", [])]
     tables = [
         _written("vertex", vertex, {}, len(data.V)),
-        _written("face", _scalars(data.on_faces, {}), lists, len(data.F)),
+        _written("face", _scalars(on_faces, {}), lists, len(data.F)),
     ]
-    lines = ["ply", "format binary_little_endian 1.0", *comments]
+    lines = ["ply", "format binary_little_endian 1.0"]
+    lines += [f"comment {line}" for line in comments]
     header = "\n".join([*lines, *(line for head, _ in tables for line in head), "end_header\n"])
     return header.encode() + b"".join(rows for _, rows in tables)
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..core.vocabulary import EQUILATERAL_AREA, FloatArray
-from ..measures.quality import Elements, Quality
+from ..measures.quality import Elements
+from ..measures.record import Quality
 
 __all__ = ["build_charts"]
 

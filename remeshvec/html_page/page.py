@@ -24,10 +24,12 @@ from string import Template
 from typing import TYPE_CHECKING, Any, cast
 
 from ..core import arguments
+from ..core.check import as_array
 from ..core.version import __version__
 from ..errors import OptionError, RemeshvecError
 from ..files.disk import check_writable, write_file
-from ..measures.quality import Quality, elements
+from ..measures.quality import elements
+from ..measures.record import Quality
 from ..viz.pictures import UP
 from .charts import build_charts
 from .views import build_views
@@ -90,7 +92,10 @@ def html_report(result: RemeshResult, *, title: str = "", command: str = "", up:
     plotly = require_plotly()
     qualities = (report.quality_before, report.quality_after)
     measured = (elements(*report.before), elements(*report.after))
-    curves = (result.input_feature_edges, result.feature_edges)
+    curves = (
+        as_array(result.input_feature_edges, "input_feature_edges"),  # not tensors
+        as_array(result.feature_edges, "feature_edges"),
+    )
     views = build_views(measured, curves, qualities, report.target_length, up)
     charts = build_charts(measured, qualities, report.target_length)
     return Template(_part("report.html")).substitute(
@@ -182,7 +187,7 @@ def require_plotly() -> Any:
     try:
         return importlib.import_module("plotly.offline")
     except ImportError as error:
-        raise PlotlyMissingError("HTML pages need Plotly: pip install 'remeshvec[html]'") from error
+        raise PlotlyMissingError("HTML pages need Plotly: pip install plotly") from error
 
 
 def _report_of(result: Any) -> Report:

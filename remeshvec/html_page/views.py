@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.vocabulary import EQUILATERAL_AREA, FloatArray, IntArray
-from ..measures.quality import Elements, Quality
+from ..measures.quality import Elements
+from ..measures.record import Quality
 from ..viz.pictures import UP, Camera, three_quarter_view
 
 __all__ = ["COLOURINGS", "MOST_EDGED", "MOST_FACES", "Views", "build_views"]

@@ -10,9 +10,12 @@ from typing import Any, Literal, TypedDict
 
 from numpy.typing import ArrayLike
 
+from ..core.shown import given_fields
+
 __all__ = [
     "MAX_FACES",
     "OPTION_NAMES",
+    "OTHER_NAMES",
     "Boundary",
     "Callback",
     "Preset",
@@ -38,7 +41,7 @@ Corners = (
 Callback = Callable[[int, str, int], Any]  # sweep, phase, count; False ends the call
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class RemeshOptions:
     """All options of `remesh`, as the caller gives them; `remesh` documents each.
 
@@ -78,6 +81,14 @@ class RemeshOptions:
     threads: int | None = None
     callback: Callback | None = None
 
+    def __repr__(self) -> str:
+        given = {
+            field.name: value
+            for field in fields(self)
+            if (value := getattr(self, field.name)) is not field.default
+        }
+        return f"RemeshOptions({', '.join(given_fields(given))})"
+
 
 class RemeshKeywords(TypedDict, total=False):
     """The fields of `RemeshOptions` as keywords, for type checkers."""
@@ -113,6 +124,28 @@ class RemeshKeywords(TypedDict, total=False):
 
 OPTION_NAMES = tuple(field.name for field in fields(RemeshOptions))
 
+# What other libraries call these options.
+OTHER_NAMES = {
+    **dict.fromkeys(
+        ("edge_length", "edge_len", "edgelen", "length", "target_length", "target_edge_length",
+         "targetlen", "h", "size", "mesh_size", "lc", "l"), "L",
+    ),
+    **dict.fromkeys(
+        ("faces", "num_faces", "nfaces", "target_faces", "target_face_num", "face_count", "n_cells"),
+        "n_faces",
+    ),
+    **dict.fromkeys(
+        ("vertices", "num_vertices", "nvertices", "nclus", "n_points", "vertex_count"), "n_vertices"
+    ),
+    **dict.fromkeys(("sweeps", "n_iter", "num_iters", "niter", "n_iterations"), "iterations"),
+    **dict.fromkeys(("crease_angle", "dihedral_angle", "sharp_angle", "featuredeg"), "feature_angle"),
+    **dict.fromkeys(("tolerance", "hausdorff", "hausd", "max_error", "maxsurfdist"), "max_deviation"),
+    **dict.fromkeys(("n_threads", "num_threads", "n_jobs"), "threads"),
+    **dict.fromkeys(("hgrad", "grading", "growth"), "gradation"),
+    "labels": "face_labels",
+    "features": "feature_edges",
+}  # fmt: skip
+
 
 def read_options(caller: str, given: dict[str, Any]) -> RemeshOptions:
     """Make the record from keywords.
@@ -124,10 +157,17 @@ def read_options(caller: str, given: dict[str, Any]) -> RemeshOptions:
     """
     for name in given:
         if name not in OPTION_NAMES:
-            near = difflib.get_close_matches(name, OPTION_NAMES, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise TypeError(f"{caller}() got an unexpected keyword argument {name!r}{hint}")
+            raise TypeError(
+                f"{caller}() got an unexpected keyword argument {name!r}{_did_you_mean(name)}"
+            )
     return RemeshOptions(**given)
+
+
+def _did_you_mean(name: str) -> str:
+    """Suggest a keyword: the one that other libraries call so, or else one that is spelt like it."""
+    other = OTHER_NAMES.get(name.lower())
+    near = [other] if other else difflib.get_close_matches(name, OPTION_NAMES, 1)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 class _Annotation(str):

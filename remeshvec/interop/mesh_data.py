@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from ..core.vocabulary import EQUAL_DATA
 from ..mesh.edges import components, edge_keys, halfedge_ends
 
-__all__ = ["Data", "MeshData", "carry", "corner_values", "split_vertices"]
+__all__ = [
+    "Data",
+    "MeshData",
+    "carry",
+    "corner_values",
+    "split_vertices",
+    "with_data_at_vertices",
+    "with_uv_at_corners",
+]
 
 Data = dict[str, NDArray[Any]]
 
@@ -69,6 +77,33 @@ class MeshData:
 def corner_values(values: NDArray[Any], F: NDArray[Any]) -> NDArray[Any]:
     """Spread data on vertices (n, ...) to corners (m, 3, ...)."""
     return np.asarray(values)[F]
+
+
+def with_uv_at_corners(data: MeshData, name: str) -> MeshData:
+    """Return a mesh whose texture coordinates, data on vertices of that name, are ``"uv"`` on corners."""
+    on_vertices = dict(data.on_vertices)
+    uv = corner_values(on_vertices.pop(name), data.F)[..., :2]
+    uv = np.ascontiguousarray(uv, uv.dtype.newbyteorder("="))
+    features = [known for known in data.feature_data if known != name]
+    return replace(
+        data,
+        on_vertices=on_vertices,
+        on_corners={**data.on_corners, "uv": uv},
+        feature_data=("uv", *features),
+    )
+
+
+def with_data_at_vertices(data: MeshData) -> MeshData:
+    """Return a mesh whose data on corners are on vertices; those whose corners differ are doubled."""
+    if not data.on_corners:
+        return data
+    corner, F = split_vertices(data.F, list(data.on_corners.values()))
+    old = data.F.ravel()[corner]
+    on_vertices = {name: x[old] for name, x in data.on_vertices.items()}
+    on_vertices |= {
+        name: x.reshape(-1, *x.shape[2:])[corner] for name, x in data.on_corners.items()
+    }
+    return replace(data, V=data.V[old], F=F, on_vertices=on_vertices, on_corners={})
 
 
 def carry(data: MeshData, result: Any) -> MeshData:

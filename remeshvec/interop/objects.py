@@ -44,8 +44,17 @@ def read_object(mesh: Any) -> MeshData:
         raise MeshInputError(f"{mesh} is a path: remesh_file remeshes files, read_mesh reads them")
     raise MeshInputError(
         f"{type(mesh).__module__}.{type(mesh).__qualname__} is not a mesh of a known type; "
-        "give V and F, or an object of trimesh, pyvista, meshio or open3d"
+        f"{_remedy(mesh)}"
     )
+
+
+def _remedy(value: Any) -> str:
+    """Say what to give instead of something that is not a mesh."""
+    if _has(value, "combine", "n_blocks", "keys"):  # pyvista.MultiBlock
+        return "remesh its blocks one by one, or blocks.combine().extract_surface() as one"
+    if _has(value, "geometry", "graph", "to_mesh"):  # trimesh.Scene
+        return "remesh the meshes of scene.dump() one by one, or scene.to_mesh() as one"
+    return "give V and F, or an object of trimesh, pyvista, meshio or open3d"
 
 
 def _has(value: Any, *names: str) -> bool:
@@ -120,8 +129,8 @@ def _is_pyvista(value: Any) -> bool:
 
 
 def read_pyvista(mesh: Any) -> MeshData:
-    """Read a ``pyvista.PolyData`` with point, cell and field data."""
-    if not _has(mesh, "is_all_triangles", "regular_faces"):
+    """Read a ``pyvista.PolyData`` with point, cell and field data; polygons are triangulated."""
+    if not _has(mesh, "is_all_triangles"):  # regular_faces raises where polygons are mixed
         raise MeshInputError(f"{type(mesh).__name__} is not a surface; use mesh.extract_surface()")
     others = mesh.n_lines + mesh.n_verts
     if others:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +11,8 @@ from numpy.typing import ArrayLike
 from ..core.arguments import count
 from ..core.check import as_mesh
 from ..core.vocabulary import FloatArray, IntArray
+from ..errors import OptionError
+from ..interop.given import MeshObject, is_whole, whole_arrays
 
 __all__ = ["SurfaceDistance", "surface_distance"]
 
@@ -52,7 +55,12 @@ class SurfaceDistance:
 
 
 def surface_distance(
-    V1: ArrayLike, F1: ArrayLike, V2: ArrayLike, F2: ArrayLike, *, samples: int = 100_000
+    V1: ArrayLike | MeshObject,
+    F1: Any = None,
+    V2: Any = None,
+    F2: Any = None,
+    *,
+    samples: int = 100_000,
 ) -> SurfaceDistance:
     """Measure how far two surfaces are apart, in both directions.
 
@@ -67,9 +75,10 @@ def surface_distance(
     Parameters
     ----------
     V1, F1 : (n, 3) float, (m, 3) int
-        First surface; its bounding box gives `diagonal`.
+        First surface; its bounding box gives `diagonal`. Or one whole mesh, as for `remesh`, or a
+        result: ``surface_distance(mesh, result)``.
     V2, F2 : (k, 3) float, (l, 3) int
-        Second surface.
+        Second surface; or one whole mesh.
     samples : int
         Points on the faces of each surface.
 
@@ -86,6 +95,7 @@ def surface_distance(
         `samples` is less than 1.
     """
     samples = count(samples, "samples")
+    V1, F1, V2, F2 = _two_meshes([V1, F1, V2, F2])
     first, second = as_mesh(V1, F1, ("V1", "F1")), as_mesh(V2, F2, ("V2", "F2"))
     max_12, rms_12, mean_12 = _one_sided(*first, *second, samples)
     max_21, rms_21, mean_21 = _one_sided(*second, *first, samples)
@@ -105,6 +115,17 @@ def surface_distance(
         hausdorff_relative=hausdorff / diagonal if diagonal else 0.0,
         rms_relative=rms / diagonal if diagonal else 0.0,
     )
+
+
+def _two_meshes(given: list[Any]) -> list[Any]:
+    """Put the arrays of whole meshes into the places of meshes; what follows them moves along."""
+    arrays: list[Any] = []
+    while given and len(arrays) < 4:
+        first, *given = given
+        arrays += whole_arrays(first) if len(arrays) % 2 == 0 and is_whole(first) else [first]
+    if any(x is not None for x in given):
+        raise OptionError("surface_distance takes two meshes; more was given")
+    return arrays
 
 
 def _one_sided(

@@ -16,6 +16,7 @@ from ..core.arguments import choice, flag
 from ..core.check import as_mesh, which
 from ..core.vocabulary import FloatArray
 from ..errors import MeshInputError
+from ..interop.given import MeshObject, takes_meshes
 from ..mesh.edges import used_vertices
 
 __all__ = ["AREAS", "cotangent_matrix", "laplacian", "polyharmonic_matrix", "vertex_areas"]
@@ -24,7 +25,8 @@ Area = Literal["voronoi", "uniform"]
 AREAS = ("voronoi", "uniform")
 
 
-def cotangent_matrix(V: ArrayLike, F: ArrayLike) -> sp.csc_array:
+@takes_meshes
+def cotangent_matrix(V: ArrayLike | MeshObject, F: Any = None) -> sp.csc_array:
     """Cotangent matrix C, the stiffness matrix of linear elements with the sign of the Laplacian.
 
     ``C[i, j] = (cot a + cot b) / 2`` with the angles a and b opposite edge ij; rows sum to 0 [Pinkall
@@ -61,12 +63,14 @@ def cotangent_matrix(V: ArrayLike, F: ArrayLike) -> sp.csc_array:
     return sp.csc_array((C + C.T) * 0.5)
 
 
-def vertex_areas(V: ArrayLike, F: ArrayLike, area: Area = "voronoi") -> FloatArray:
+@takes_meshes
+def vertex_areas(V: ArrayLike | MeshObject, F: Any = None, area: Area = "voronoi") -> FloatArray:
     """Area of each vertex: its share of the area of the surface.
 
     Parameters
     ----------
-    V : (n, 3) float
+    V : (n, 3) float, or a mesh
+        Or a whole mesh as for `remesh`, or a result.
     F : (m, 3) int
     area : {"voronoi", "uniform"}
         "voronoi": mixed Voronoi areas [Meyer et al. 2003, section 3.3]. "uniform": their mean, for all
@@ -97,8 +101,12 @@ def vertex_areas(V: ArrayLike, F: ArrayLike, area: Area = "voronoi") -> FloatArr
     return areas
 
 
+@takes_meshes
 def laplacian(
-    V: ArrayLike, F: ArrayLike, area: Area = "voronoi", symmetric: bool = False
+    V: ArrayLike | MeshObject,
+    F: Any = None,
+    area: Area = "voronoi",
+    symmetric: bool = False,
 ) -> sp.csc_array:
     """Discrete Laplacian ``M^-1 C``: cotangents over vertex areas.
 
@@ -107,7 +115,8 @@ def laplacian(
 
     Parameters
     ----------
-    V : (n, 3) float
+    V : (n, 3) float, or a mesh
+        Or a whole mesh as for `remesh`, or a result.
     F : (m, 3) int
     area : {"voronoi", "uniform"}
         See `vertex_areas`.

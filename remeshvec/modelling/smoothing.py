@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..core.arguments import choice, count, flag, number
 from ..core.vocabulary import BoolArray, FloatArray, IntArray
 from ..errors import MeshInputError, OptionError
+from ..interop.given import MeshObject, takes_meshes
 from ..mesh.edges import components, halfedge_ends, lengths_in_triangles, used_vertices
 from .laplacians import AREAS, Area, cotangent_matrix, vertex_areas
 from .movable import Movable, as_movable, double_areas, keep_vanished, warn_if_idle
@@ -25,9 +26,10 @@ _FLAT = 1e-8
 _VANISHED_VOLUME = 1e-3
 
 
+@takes_meshes
 def smooth(
-    V: ArrayLike,
-    F: ArrayLike,
+    V: ArrayLike | MeshObject,
+    F: Any = None,
     step: float | None = None,
     iterations: int = 1,
     *,
@@ -45,7 +47,8 @@ def smooth(
 
     Parameters
     ----------
-    V : (n, 3) float
+    V : (n, 3) float, or a mesh
+        Or a whole mesh as for `remesh`, or a result; what comes back are its vertices.
     F : (m, 3) int
     step : float, optional
         Time per step, in squared units of V. By default the squared mean edge length.

@@ -43,7 +43,7 @@ class LaplacianSolver:
         Vertices with given values.
     method : {"auto", "cholesky", "cholmod", "lu"}
         Factorisation. "cholesky" is Eigen's simplicial one, from libigl, which factors fastest. "cholmod"
-        is SuiteSparse's, from the package cholespy (``pip install 'remeshvec[cholmod]'``): it takes twice
+        is SuiteSparse's, from the package cholespy (``pip install cholespy``): it takes twice
         as long to factor and 0.4 of the time to solve, so it pays from about 15 solves on. "lu" is
         SuperLU, from SciPy. "auto" is "cholesky" where the part of A between free vertices is symmetric
         with diagonal entries of one sign, else "lu".
@@ -239,9 +239,7 @@ def _with_cholmod(inner: sp.csc_array) -> Callable[[FloatArray], FloatArray]:
     try:
         from cholespy import CholeskySolverD, MatrixType
     except ImportError as error:
-        raise OptionError(
-            "method='cholmod' needs cholespy: pip install 'remeshvec[cholmod]'"
-        ) from error
+        raise OptionError("method='cholmod' needs cholespy: pip install cholespy") from error
     sign = _sign(inner)
     A = sp.csc_array(sign * inner)
     A.sort_indices()

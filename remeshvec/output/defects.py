@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.shown import one_line
 from ..core.vocabulary import FloatArray, IntArray
 from ..mesh.edges import edge_keys, halfedge_ends
 from ..mesh.morton import order_mesh
@@ -25,7 +26,7 @@ _SLIVER = 5.0
 _NO_AREA = 1e-12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
 class Defects:
     """Faces of a mesh that are not as they should be, by their indices.
 
@@ -61,6 +62,9 @@ class Defects:
         names["crossing"] = "faces that cross others"
         found = [f"{n} {names.get(name, name)}" for name, n in self.to_dict().items() if n]
         return ", ".join(found) or "none"
+
+    def __repr__(self) -> str:
+        return one_line("Defects", str(self))
 
 
 def find_defects(

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ..core.arguments import flag
+from ..core.shown import html_table, one_line
 from ..core.vocabulary import IntArray
 from ..input.recipe import Recipe
-from ..measures.quality import Quality, quality
+from ..measures.quality import quality
+from ..measures.record import HIGHLIGHTS, Quality, side_by_side
 from .defects import Defects, find_defects
 
 __all__ = [
@@ -20,9 +22,9 @@ __all__ = [
 ]
 
 
-@dataclass
+@dataclass(repr=False, eq=False)
 class Report:
-    """What happened in a call.
+    """What happened in a call; ``print`` shows it as a table.
 
     Attributes
     ----------
@@ -58,9 +60,47 @@ class Report:
     dirt: dict[str, int]
     features: dict[str, int]
     deviation: dict[str, float]
-    before: tuple[ArrayLike, ArrayLike] = field(repr=False)
-    after: tuple[ArrayLike, ArrayLike] = field(repr=False)
-    turned: Callable[[], IntArray] = field(repr=False)
+    before: tuple[ArrayLike, ArrayLike]
+    after: tuple[ArrayLike, ArrayLike]
+    turned: Callable[[], IntArray]
+
+    def __repr__(self) -> str:
+        return one_line("Report", *self.facts())
+
+    def __str__(self) -> str:
+        lines = [f"note: {name.replace('_', ' ')}: {count:,}" for name, count in self.dirt.items()]
+        kept = {name.replace("_", " "): count for name, count in self.features.items() if count}
+        if kept:
+            lines.append("features: " + ", ".join(f"{name} {n:,}" for name, n in kept.items()))
+        for way, distance in self.deviation.items():
+            lines.append(f"deviation {way.replace('_', ' ')}: {distance:.4g}")
+        lines += [self._course(), "", side_by_side(self.quality_before, self.quality_after)]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        before, after = self.quality_before.rows(), self.quality_after.rows()
+        rows = [
+            (label, old, new)
+            for (label, old), (_, new) in zip(before, after, strict=True)
+            if label in HIGHLIGHTS
+        ]
+        return html_table(rows, ("", "before", "after"), self._course())
+
+    def facts(self) -> tuple[str, ...]:
+        """Return what happened in a few words each, without measuring anything."""
+        before, after = len(self.before[1]), len(self.after[1])  # type: ignore[arg-type]
+        return (
+            f"{before:,} faces -> {after:,}",
+            f"L = {self.target_length:.4g}",
+            f"preset {self.preset}",
+            self.stop,
+        )
+
+    def _course(self) -> str:
+        return (
+            f"target length {self.target_length:.4g}, preset {self.preset}, "
+            f"{len(self.sweeps)} sweeps in {self.seconds['total']:.2f} s; {self.stop}"
+        )
 
     @property
     def preset(self) -> str:

@@ -14,6 +14,7 @@ __all__ = [
     "TRANSFER_METHODS",
     "as_matrix",
     "as_values",
+    "in_kind_of",
     "interpolate",
     "is_tensor",
     "like",
@@ -128,6 +129,29 @@ def like(values: Any, array: NDArray[Any]) -> Any:
     import torch
 
     return torch.as_tensor(np.ascontiguousarray(array), device=values.device)
+
+
+def in_kind_of(mesh: tuple[Any, Any], value: Any) -> Any:
+    """Return an array or a sparse matrix as what V and F are: a tensor beside theirs, or as it is.
+
+    Floating-point numbers get the type of V. Sparse tensors are in coordinates, through whose products
+    gradients flow on every device.
+    """
+    given = next((x for x in mesh if is_tensor(x)), None)
+    if given is None:
+        return value
+    import torch
+
+    def tensor(array: NDArray[Any]) -> Any:
+        made = like(given, array)
+        are_reals = made.is_floating_point() and given.is_floating_point()
+        return made.to(given.dtype) if are_reals else made
+
+    if isinstance(value, np.ndarray):
+        return tensor(value)
+    entries = value.tocoo()
+    at, numbers = tensor(np.stack(entries.coords).astype(np.int64)), tensor(entries.data)
+    return torch.sparse_coo_tensor(at, numbers, entries.shape, check_invariants=True).coalesce()
 
 
 def as_matrix(index: IntArray, weights: FloatArray, n: int) -> Any:

@@ -15,15 +15,18 @@ from ..core.stopwatch import Stopwatch
 from ..core.threads import thread_scope
 from ..core.vocabulary import NONE, IntArray
 from ..input.constraints import make_constraints
-from ..input.options import RemeshKeywords, read_options, with_options
+from ..input.options import RemeshKeywords, RemeshOptions, read_options, with_options
 from ..input.prepare import prepare
 from ..input.recipe import make_recipe
+from ..interop.given import MeshObject, has_arrays, is_pair, whole_arrays
+from ..interop.objects import read_object
 from ..output.input_edges import input_numbers, vertices_of_edges
 from ..output.transfer import is_tensor, to_numpy
 from ..sweeps.monitor import Monitor
 from ..sweeps.work import is_large
 from .arrays import read_sizing
 from .job import Job, Lengths
+from .objects import are_arrays, only_length, with_named_data
 
 __all__ = ["find_creases"]
 
@@ -33,9 +36,9 @@ if TYPE_CHECKING:
 
 @overload
 def find_creases(
-    V: ArrayLike,
-    F: ArrayLike,
-    L: Lengths | None = None,
+    V: ArrayLike | MeshObject,
+    F: Any = None,
+    L: Lengths | str | None = None,
     *,
     return_dropped: Literal[False] = False,
     **options: Unpack[RemeshKeywords],
@@ -44,9 +47,9 @@ def find_creases(
 
 @overload
 def find_creases(
-    V: ArrayLike,
-    F: ArrayLike,
-    L: Lengths | None = None,
+    V: ArrayLike | MeshObject,
+    F: Any = None,
+    L: Lengths | str | None = None,
     *,
     return_dropped: Literal[True],
     **options: Unpack[RemeshKeywords],
@@ -55,9 +58,9 @@ def find_creases(
 
 @with_options
 def find_creases(
-    V: ArrayLike,
-    F: ArrayLike,
-    L: Lengths | None = None,
+    V: ArrayLike | MeshObject,
+    F: Any = None,
+    L: Lengths | str | None = None,
     *,
     return_dropped: bool = False,
     **options: Any,
@@ -69,8 +72,8 @@ def find_creases(
 
     Parameters
     ----------
-    V : (n, 3) float or int
-        Vertices; any array-like.
+    V : (n, 3) float or int, or a mesh
+        Vertices; any array-like. Or a whole mesh as for `remesh`, with ``L`` after it.
     F : (m, 3) int
         Triangles as 0-based indices.
     L : float, (n,) array, callable or Adaptive, optional
@@ -108,6 +111,7 @@ def find_creases(
     """
     wanted = read_options("find_creases", options)
     with_dropped = flag(return_dropped, "return_dropped")
+    V, F, L, wanted = _with_arrays(V, F, L, wanted)
     recipe = make_recipe(wanted)
     sizing, count = read_sizing(L, wanted)
     vertices, faces = as_mesh(_as_array(V), _as_array(F))
@@ -128,6 +132,18 @@ def find_creases(
     if not with_dropped:
         return edges
     return edges, {name: edges_of(h) for name, h in creases.dropped.items()}
+
+
+def _with_arrays(
+    V: Any, F: Any, L: Any, wanted: RemeshOptions
+) -> tuple[Any, Any, Any, RemeshOptions]:
+    """Return the arrays of a mesh, the length, and the options with the data that they name."""
+    if is_pair(V) or has_arrays(V):
+        return *whole_arrays(V), only_length(F, L), wanted
+    if are_arrays(V, F):
+        return V, F, L, wanted
+    data = read_object(V)
+    return data.V, data.F, *with_named_data(data, only_length(F, L), wanted)
 
 
 def _as_array(given: Any) -> Any:

@@ -6,35 +6,22 @@ from dataclasses import replace
 from numbers import Real
 from typing import Any
 
-import numpy as np
-
 from ..errors import OptionError
 from ..input.options import RemeshOptions
 from ..interop.mesh_data import MeshData, carry
 from ..interop.objects import is_mesh_object, read_object
 from ..output.result import RemeshResult
-from ..output.transfer import to_numpy
 from ..sizing.adaptive import Adaptive
 from .arrays import remesh_arrays
 
-__all__ = ["are_arrays", "is_pair", "only_length", "remesh_object"]
+__all__ = ["are_arrays", "only_length", "remesh_object", "with_named_data"]
 
 
 def are_arrays(V: Any, F: Any) -> bool:
-    """Tell two arrays from a mesh object and, perhaps, a length; pairs are told by `is_pair`."""
+    """Tell two arrays from a mesh object and, perhaps, a length; not for pairs and results."""
     is_length = F is None or isinstance(F, Real | str | Adaptive) or callable(F)
     is_array = hasattr(V, "__array__") or isinstance(V, tuple | list)
     return not (is_mesh_object(V) or (is_length and not is_array))
-
-
-def is_pair(V: Any) -> bool:
-    """Tell the arrays of a whole mesh from two vertices."""
-    if not isinstance(V, tuple | list) or len(V) != 2:
-        return False
-    try:
-        return all(np.ndim(to_numpy(x)) == 2 for x in V)
-    except ValueError:  # rows of unequal length
-        return False
 
 
 def only_length(F: Any, L: Any) -> Any:
@@ -47,17 +34,17 @@ def only_length(F: Any, L: Any) -> Any:
 def remesh_object(mesh: Any, L: Any, options: RemeshOptions) -> tuple[Any, RemeshResult]:
     """Remesh an object; returns a new one of its type with the same data, and the result."""
     data = read_object(mesh)
-    if isinstance(L, str):
-        if L not in data.on_vertices:
-            raise OptionError(f"there are no data {L!r} on vertices; {_names_of(data.on_vertices)}")
-        L = data.on_vertices[L]
-    result = remesh_arrays(data.V, data.F, L, _with_named_data(data, options))
+    result = remesh_arrays(data.V, data.F, *with_named_data(data, L, options))
     assert data.wrap is not None
     return data.wrap(carry(data, result)), result
 
 
-def _with_named_data(data: MeshData, options: RemeshOptions) -> RemeshOptions:
-    """Put data of the object in the place of their names, and keep those that are features."""
+def with_named_data(data: MeshData, L: Any, options: RemeshOptions) -> tuple[Any, RemeshOptions]:
+    """Put data of an object in the place of their names, and keep those that are features."""
+    if isinstance(L, str):
+        if L not in data.on_vertices:
+            raise OptionError(f"there are no data {L!r} on vertices; {_names_of(data.on_vertices)}")
+        L = data.on_vertices[L]
     changes = {
         name: _named(data, value, name)
         for name in ("fixed_faces", "face_labels", "selection")
@@ -69,7 +56,7 @@ def _with_named_data(data: MeshData, options: RemeshOptions) -> RemeshOptions:
     else:
         several = preserve if isinstance(preserve, list | tuple) else [preserve]
     found = [_named(data, x, "preserve") if isinstance(x, str) else x for x in several]
-    return replace(options, preserve=data.preserved(found), **changes)
+    return L, replace(options, preserve=data.preserved(found), **changes)
 
 
 def _named(data: MeshData, name: str, option: str) -> Any:

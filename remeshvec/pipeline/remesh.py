@@ -9,16 +9,16 @@ from numpy.typing import ArrayLike
 from ..core.arguments import flag
 from ..errors import OptionError
 from ..input.options import RemeshKeywords, read_options, with_options
+from ..interop.given import MeshObject, has_arrays, is_pair, whole_arrays
 from ..output.result import RemeshResult
-from ..output.transfer import is_tensor, like, to_numpy
+from ..output.transfer import in_kind_of, is_tensor, like, to_numpy
 from .arrays import remesh_arrays
 from .job import Lengths
-from .objects import are_arrays, is_pair, only_length, remesh_object
+from .objects import are_arrays, only_length, remesh_object
 
 __all__ = ["remesh"]
 
 M = TypeVar("M")
-MeshObject = Any  # of another library
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -74,7 +74,7 @@ def remesh(
     ----------
     V : (n, 3) float or int, or a mesh
         Vertices; any array-like, never modified. Or a whole mesh, with ``L`` after it: a pair ``(V,
-        F)``, a ``trimesh.Trimesh``, ``pyvista.PolyData``, ``meshio.Mesh`` or
+        F)``, an earlier result, a ``trimesh.Trimesh``, ``pyvista.PolyData``, ``meshio.Mesh`` or
         ``open3d.geometry.TriangleMesh``. Objects come back as objects of the same type, with colours,
         texture coordinates, fields and groups; seams of textures and borders of groups are kept.
         Tensors of PyTorch come back as tensors.
@@ -191,8 +191,8 @@ def remesh(
     wanted = read_options("remesh", options)
     with_result = flag(return_result, "return_result")
     mesh: Any = V
-    if is_pair(mesh):
-        (V, F), L = mesh, only_length(F, L)
+    if is_pair(mesh) or has_arrays(mesh):
+        (V, F), L = whole_arrays(mesh), only_length(F, L)
     elif not are_arrays(V, F):
         new, result = remesh_object(mesh, only_length(F, L), wanted)
         return (new, result) if with_result else new
@@ -203,4 +203,8 @@ def remesh(
     result = remesh_arrays(V, F, L, wanted)
     if any(map(is_tensor, given)):
         result.V, result.F = (like(x, y) for x, y in zip(given, result, strict=True))
+        mesh = result.V, result.F
+        result.lengths = in_kind_of(mesh, result.lengths)
+        if result.face_labels is not None:
+            result.face_labels = in_kind_of(mesh, result.face_labels)
     return result

@@ -185,7 +185,7 @@ def require_viewer(*, window: bool = False) -> Any:
         pyvista = importlib.import_module("pyvista")
     except ImportError as error:
         raise ViewerMissingError(
-            "pictures and the viewer need PyVista: pip install 'remeshvec[viz]'"
+            "pictures and the viewer need PyVista: pip install pyvista"
         ) from error
     has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if window and sys.platform.startswith("linux") and not has_display:

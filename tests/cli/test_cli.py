@@ -15,9 +15,10 @@ from helpers import zoo
 from helpers.processes import surroundings
 
 import remeshvec
+from remeshvec import read_mesh, write_mesh
 from remeshvec.cli.command import ProgressLine, main
 from remeshvec.errors import OptionError
-from remeshvec.files.mesh_files import SUFFIXES, read_mesh, write_mesh
+from remeshvec.files.mesh_files import SUFFIXES
 
 
 def bumpy_sheet(n=12):
@@ -214,11 +215,40 @@ def test_bad_input_ends_with_one_line_before_the_work(arguments, reason, sheet, 
         ["batch", "in.obj", "--out", ""],
     ],
 )
-def test_bad_arguments_end_with_the_usage(arguments, sheet, capsys):
+def test_bad_arguments_end_with_one_line(arguments, sheet, capsys):
     with pytest.raises(SystemExit) as caught:
         main(arguments)
     assert caught.value.code == 2
-    assert "usage: remeshvec" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert err.startswith("remeshvec") and err.count("\n") == 1
+    assert "--help lists all arguments" in err and "_positive_number" not in err
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("in.obj --lenght 1", "there is no flag --lenght; did you mean --length?"),
+        ("in.obj --edge-length=1", "there is no flag --edge-length; did you mean --length?"),
+        ("in.obj --target-length 1", "there is no flag --target-length; did you mean --length?"),
+        ("in.obj --num-faces 9", "there is no flag --num-faces; did you mean --n-faces?"),
+        ("in.obj --n-jobs 9", "there is no flag --n-jobs; did you mean --threads?"),
+        ("batch in.obj --outt out", "there is no flag --outt; did you mean --out?"),
+        ("in.obj --xyzzy", "there is no flag --xyzzy ("),
+        ("in.obj --preset evn", "did you mean even?"),
+        ("in.obj --length few", "argument --length: few is not a positive number"),
+        ("in.obj --iterations 1.5", "1.5 is not a whole number, at least 1"),
+    ],
+)
+def test_wrong_flags_get_the_right_one(words, line, sheet, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(words.split())
+    err = capsys.readouterr().err
+    assert caught.value.code == 2 and line in err and err.count("\n") == 1
+
+
+def test_flags_may_be_abbreviated_and_names_begin_with_dashes(sheet, capsys):
+    write_mesh("--odd.obj", *bumpy_sheet())
+    assert main(["--quie", "--", "--odd.obj"]) == 0
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_ply_keeps_every_property(tmp_path, flat):
     data.on_vertices["normal"] = data.V / np.linalg.norm(data.V, axis=1, keepdims=True)
     data.on_vertices["count"] = np.arange(len(data.V))
     data.on_faces["quality"] = np.linspace(0, 1, len(data.F)).astype(np.float32)
-    data.extra["comments"] = ["TextureFile wood.png"]
+    data.extra["comments"] = ["TextureFile wood.png", "one"]
     write_data(source, data)
     assert np.array_equal(read_mesh(source).V, data.V)
     result = remesh_file(source, target, 0.3, preserve=data.on_faces["group"])
@@ -80,7 +80,8 @@ def test_ply_keeps_every_property(tmp_path, flat):
     assert np.array_equal(out.V, result.V) and np.array_equal(out.F, result.F)
     assert_field(out)
     assert_groups(out)
-    assert out.extra["comments"] == ["TextureFile wood.png"]
+    assert out.extra["comments"] == (["one"] if not flat else ["TextureFile wood.png", "one"])
+    assert b"\ncomment TextureFile wood.png\n" in target.read_bytes()
     assert out.on_vertices["count"].dtype == np.int32
     assert out.on_faces["quality"].dtype == np.float32
     assert out.on_vertices["color"].dtype == np.uint8

@@ -144,7 +144,7 @@ def test_nothing_is_lost_between_processes(tmp_path, suffix):
     library = need_library(suffix)
     path = tmp_path / f"a{suffix}"
     write_data(path, loaded_cube())
-    here, notices = foreign._read_here((library, path), None)
+    here, notices = foreign._read_here((library, path, tmp_path), None)
     data, others = read_data(path)
     assert others == notices and data.feature_data == here.feature_data
     for name in ("on_vertices", "on_faces", "on_corners"):

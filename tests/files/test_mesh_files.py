@@ -12,9 +12,10 @@ import pytest
 from helpers import zoo
 from helpers.hostile_files import HOSTILE, LEGAL, OBJ, OFF, F, V, as_json, ply, stl
 
+from remeshvec import read_mesh, write_mesh
 from remeshvec.errors import MeshFormatError
 from remeshvec.files.disk import check_writable, write_file
-from remeshvec.files.mesh_files import SUFFIXES, read_mesh, write_mesh
+from remeshvec.files.mesh_files import SUFFIXES
 
 
 @pytest.mark.parametrize("name", LEGAL)

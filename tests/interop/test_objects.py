@@ -122,6 +122,18 @@ def test_pyvista_polygons_and_normals():
     assert (np.einsum("ij,ij->i", normals, ball.points) > 0.49).all()
 
 
+@pytest.mark.parametrize("name", ["Cylinder", "Cone", "Arrow", "Dodecahedron", "Disc"])
+def test_pyvista_with_mixed_polygons(name):
+    pv = pytest.importorskip("pyvista")
+    mesh = getattr(pv, name)()
+    mesh.cell_data["number"] = np.arange(mesh.n_cells)
+    out = remesh(mesh, 0.05)
+    assert out.is_all_triangles and np.isclose(out.area, mesh.triangulate().area, rtol=0.06)
+    assert out.cell_data["number"].dtype == mesh.cell_data["number"].dtype
+    assert name == "Disc" or out.clean().n_open_edges == mesh.triangulate().clean().n_open_edges
+    assert mesh.remeshvec.quality().faces == mesh.triangulate().n_cells
+
+
 def test_pyvista_lines_are_left_out_aloud():
     pv = pytest.importorskip("pyvista")
     p, tri, _ = textured.grid(4, 4, False, False)
@@ -138,6 +150,19 @@ def test_other_kinds_of_pyvista_are_named():
         remesh(pv.ImageData(dimensions=(3, 3, 3)), 0.2)
     with pytest.warns(UserWarning), pytest.raises(MeshInputError, match="no faces"):
         remesh(pv.PolyData(np.eye(3)), 0.2)
+    blocks = pv.MultiBlock([pv.Cube(), pv.Cube(center=(3, 0, 0))])
+    with pytest.raises(MeshInputError, match=r"blocks.combine\(\).extract_surface\(\)"):
+        remesh(blocks, 0.2)
+    surface = blocks.combine().extract_surface(algorithm="dataset_surface")
+    assert np.isclose(remesh(surface, 0.2).area, 12)
+
+
+def test_scenes_of_trimesh_get_a_hint():
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.Scene([trimesh.creation.box()])
+    with pytest.raises(MeshInputError, match=r"scene.to_mesh\(\) as one"):
+        remesh(scene, 0.2)
+    assert np.isclose(remesh(scene.to_mesh(), 0.2).volume, 1)
 
 
 def test_the_accessor_of_pyvista():
@@ -245,7 +270,7 @@ def test_tensors_in_tensors_out_with_gradients():
     again = result.transfer(vertices)
     assert torch.allclose(again, result.V, atol=1e-6)
     again.square().sum().backward()
-    P = torch.tensor(result.matrix().toarray(), dtype=torch.float32)
+    P = result.matrix().to_dense()
     assert torch.allclose(vertices.grad, 2 * P.T @ (P @ vertices.detach()), atol=1e-4)
     labels = result.transfer(torch.arange(len(F)), on="faces")
     assert labels.dtype == torch.int64 and labels.shape == (len(result.F),)
@@ -255,6 +280,53 @@ def test_tensors_in_tensors_out_with_gradients():
     assert torch.allclose(back, vertices.detach(), atol=1e-5)
     mixed = remesh(vertices.detach(), F, L, preserve=torch.tensor(UV))
     assert torch.is_tensor(mixed.V) and isinstance(mixed.F, np.ndarray)
+
+
+def test_everything_of_a_result_is_a_tensor():
+    torch = pytest.importorskip("torch")
+    parts = (V[F].mean(axis=1)[:, 0] > 0).astype(np.int16)
+    arrays = remesh(V, F, L, face_labels=parts)
+    result = remesh(torch.tensor(V, dtype=torch.float32), torch.tensor(F), L, face_labels=parts)
+    mixed = remesh(V, torch.tensor(F), L, face_labels=parts)
+    for name in [
+        "V", "F", "lengths", "face_labels", "birth_face", "birth_barycentric", "face_birth",
+        "corner_birth_face", "corner_birth_barycentric", "image_face", "image_barycentric",
+        "vertex_map", "face_map", "feature_edges", "input_feature_edges", "corners",
+    ]:  # fmt: skip
+        expected, found = getattr(arrays, name), getattr(result, name)
+        assert isinstance(expected, np.ndarray) and torch.is_tensor(found), name
+        assert np.allclose(found.numpy(), expected, atol=1e-6), name
+        assert found.dtype == torch.float32 or not found.is_floating_point(), name
+        assert name == "V" or torch.is_tensor(getattr(mixed, name)), name
+    assert mixed.birth_barycentric.dtype == torch.float64
+    for call in (
+        lambda r: r.matrix(), lambda r: r.matrix("faces"), lambda r: r.matrix("corners"),
+        lambda r: r.back_matrix(),
+    ):  # fmt: skip
+        assert call(result).is_sparse and call(result).dtype == torch.float32
+        assert np.allclose(call(result).to_dense().numpy(), call(arrays).toarray(), atol=1e-6)
+
+
+def test_a_network_trains_through_the_matrix():
+    torch = pytest.importorskip("torch")
+    torch.manual_seed(0)
+    result = remesh(torch.tensor(V, dtype=torch.float32), torch.tensor(F), L)
+    P, back = result.matrix(), result.back_matrix()
+    features, wanted = torch.tensor(V, dtype=torch.float32), torch.sin(3 * result.V[:, :1])
+    first = torch.nn.Linear(3, 16)  # at the vertices of the input
+    second = torch.nn.Linear(16, 1)  # at those of the result
+    adam = torch.optim.Adam([*first.parameters(), *second.parameters()], lr=0.02)
+    losses = []
+    for _ in range(150):
+        adam.zero_grad()
+        loss = (second(torch.tanh(P @ first(features))) - wanted).square().mean()
+        loss.backward()
+        adam.step()
+        losses.append(loss.item())
+    assert first.weight.grad.abs().max() > 0 and losses[-1] < 0.05 * losses[0]
+    given = result.V.clone().requires_grad_()
+    (back @ given).sum().backward()
+    assert torch.allclose(given.grad, back.to_dense().T @ torch.ones(len(V), 3), atol=1e-5)
 
 
 def test_pairs_are_meshes_too():

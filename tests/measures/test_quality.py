@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from remeshvec.errors import MeshInputError, OptionError
 from remeshvec.measures.distance import surface_distance
-from remeshvec.measures.quality import quality, side_by_side
+from remeshvec.measures.quality import quality
+from remeshvec.measures.record import side_by_side
 
 # What other tools were compared on; percent and degrees.
 PUBLISHED = {  # E face, E Voronoi, CV, min, p1, mean of min angles, valence 6
