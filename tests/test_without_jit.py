@@ -90,6 +90,7 @@ def test_whole_calls_agree_with_the_jit(monkeypatch):
         ("operations/test_relax.py", "formula or stiffness or only_inner"),
         ("reference/test_bvh.py", "size_of_tree or without_area or hint"),
         ("operations/test_untangle.py", "reach or left_alone or told_to"),
+        ("scans/test_triangulate.py", "few or straight or edge or taken"),
     ],
 )
 def test_kernel_tests_pass_as_plain_python(file, expression):

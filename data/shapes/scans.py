@@ -5,6 +5,7 @@ Fields are sampled on a grid of voxels and cut by marching cubes. Needs NumPy, S
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import igl
@@ -56,10 +57,15 @@ def creature_on_grid(voxel: float) -> Floats:
     """Distance to the creature on a grid, in voxels, negative inside."""
     from scipy.ndimage import map_coordinates
 
-    coarse = np.stack(np.meshgrid(*_axes(COARSE), indexing="ij"), axis=-1).reshape(-1, 3)
-    values = creature_field(coarse).reshape([len(axis) for axis in _axes(COARSE)])
     fine = np.meshgrid(*((axis - axis[0]) / COARSE for axis in _axes(voxel)), indexing="ij")
-    return np.asarray(map_coordinates(values, fine, order=3, mode="nearest")) / voxel
+    return np.asarray(map_coordinates(_coarse_field(), fine, order=3, mode="nearest")) / voxel
+
+
+@cache
+def _coarse_field() -> Floats:
+    axes = _axes(COARSE)
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return creature_field(points).reshape([len(axis) for axis in axes])
 
 
 def marching_cubes(field: Floats) -> Arrays:
