@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..core.arguments import count
 from ..core.vocabulary import FloatArray
+from ..interop.given import MeshObject, takes_meshes
 from ..mesh.edges import halfedge_ends
 from .movable import Movable, as_movable, keep_vanished, warn_if_idle
 
@@ -23,9 +24,10 @@ _PASS = 0.02
 _GROW = 1.0 / (_PASS - 1.0 / _SHRINK)
 
 
+@takes_meshes
 def denoise(
-    V: ArrayLike,
-    F: ArrayLike,
+    V: ArrayLike | MeshObject,
+    F: Any = None,
     iterations: int = 20,
     *,
     boundary: Literal["fixed", "free"] = "fixed",

@@ -11,6 +11,7 @@ from ..core.arguments import count, flag, number
 from ..core.check import as_mesh
 from ..core.vocabulary import FloatArray, IntArray
 from ..errors import MeshInputError
+from ..interop.given import MeshObject, takes_meshes
 from ..mesh.edges import components, halfedge_ends
 from ..mesh.orient import orient_faces
 from ..mesh.repair import drop_degenerate_faces, drop_duplicate_faces
@@ -23,9 +24,10 @@ from .weld import weld_boundary
 __all__ = ["repair"]
 
 
+@takes_meshes
 def repair(
-    V: ArrayLike,
-    F: ArrayLike,
+    V: ArrayLike | MeshObject,
+    F: Any = None,
     *,
     weld: float | None = 0.0,
     min_component: int = 0,
