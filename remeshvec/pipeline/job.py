@@ -17,22 +17,13 @@ from ..input.recipe import Recipe
 from ..reference.build import FeaturedReference, build_reference
 from ..sizing.adaptive import Adaptive
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
+from ..sweeps.care import Sweeper
 from ..sweeps.counts import count_elements
-from ..sweeps.deviation import DeviationCheck
-from ..sweeps.finish import deviation_of, finish, has_finish
-from ..sweeps.flaws import (
-    CrossingCheck,
-    FoldCheck,
-    count_more_crossings,
-    count_new_flaws,
-    has_crossings_at_curves,
-)
-from ..sweeps.guard import Check, Guard, HoldingGuard
-from ..sweeps.loop import Stop, run_sweeps
-from ..sweeps.mending import mend_folds
+from ..sweeps.finish import deviation_of, has_finish
+from ..sweeps.loop import Stop
 from ..sweeps.monitor import Monitor
-from ..sweeps.plan import Adaptation, Count, Plan, make_schedule
-from ..sweeps.work import Work, is_large
+from ..sweeps.plan import Adaptation, Count, Plan
+from ..sweeps.work import is_large
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
 
@@ -83,17 +74,6 @@ class Remeshed:
     def count_held(self) -> int:
         """Count faces that had to stay."""
         return 0 if self.featured.held is None else int(self.featured.held.sum())
-
-
-@dataclass(frozen=True)
-class Swept:
-    """A mesh after the sweeps."""
-
-    work: Work
-    stop: Stop
-    counts: list[dict[str, int]]
-    n_flaws: int  # vertices at flaws that the mesh did not have before
-    n_crossings: int = 0  # vertices of faces that cross others and did not, where they were counted
 
 
 class Job:
@@ -159,9 +139,9 @@ class Job:
         """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
         monitor = self.monitor
         with monitor.watch.time("reference"):
-            featured, length = self._build_reference(meshes[0], L)
-        before = meshes[0].copy()
-        swept = self._without_flaws(meshes.pop(), before, featured)
+            featured, length = self.build_reference(meshes[0], L)
+        sweeper = Sweeper(featured, self.plan, monitor, self.may_run_parallel, self.parallel)
+        swept = sweeper.sweep(meshes)
         work, stop, n_flaws = swept.work, swept.stop, swept.n_flaws
         is_compact = has_finish(work)
         deviation = deviation_of(work)
@@ -178,74 +158,7 @@ class Job:
             missed,
         )
 
-    def _without_flaws(self, mesh: Mesh, before: Mesh, featured: FeaturedReference) -> Swept:
-        """Sweep over a mesh, with care where that makes flaws: most meshes are done after one look."""
-        best = self._swept(mesh, before, featured, ())
-        if not self.monitor.is_cancelled:
-            if best.n_flaws == 0 and has_crossings_at_curves(best.work.mesh, self.parallel):
-                best = self._judged(best, before)
-            if best.n_flaws or best.n_crossings:
-                best = self._with_care(best, before, featured)
-        self.monitor.counts = best.counts
-        return replace(best, stop=Stop.CANCELLED) if self.monitor.is_cancelled else best
-
-    def _with_care(self, best: Swept, before: Mesh, featured: FeaturedReference) -> Swept:
-        """Mend the flaws, or sweep again from before with a guard; returns the best of all.
-
-        A guard against crossings takes several times as long as one against folds alone, and holds
-        more than it must where an input crosses itself.
-        """
-        folds = FoldCheck(self.parallel)
-        crossings = CrossingCheck(self.parallel, self.recipe.avoid_intersections)
-        has_folds = best.n_flaws > 0
-        if has_folds and self._may_mend(best.work):
-            mend_folds(best.work, before, make_schedule(self.recipe)[-1])
-            best = self._judged(best, before)
-        guards: list[tuple[Check, ...]] = [(folds,), (folds, crossings)]
-        for checks in guards[self.recipe.avoid_intersections or not has_folds :]:
-            if not (best.n_flaws or best.n_crossings) or self.monitor.is_cancelled:
-                break
-            other = self._judged(self._swept(before.copy(), before, featured, checks), before)
-            if not self.monitor.is_cancelled:
-                best = min(best, other, key=lambda swept: (swept.n_flaws, swept.n_crossings))
-        return best
-
-    def _judged(self, swept: Swept, before: Mesh) -> Swept:
-        """Count flaws, and faces that have come to cross others."""
-        after = swept.work.mesh
-        n_flaws = self._count_flaws(before, after)
-        n_crossings = count_more_crossings(before, after, self.parallel)
-        return replace(swept, n_flaws=n_flaws, n_crossings=n_crossings)
-
-    def _may_mend(self, work: Work) -> bool:
-        """Tell whether edges may be changed after the last step: no bound or count says otherwise."""
-        plan = self.plan
-        bound = plan.max_deviation is not None or plan.adaptation is not None or plan.count
-        return not (bound or work.featured.on_non_manifold is not None or self.monitor.is_cancelled)
-
-    def _count_flaws(self, before: Mesh, after: Mesh) -> int:
-        """Count the flaws that sweeps have made."""
-        if self.monitor.is_cancelled:
-            return 0
-        return count_new_flaws(before, after, self.recipe.avoid_intersections, self.parallel)
-
-    def _swept(
-        self, mesh: Mesh, before: Mesh, featured: FeaturedReference, checks: tuple[Check, ...]
-    ) -> Swept:
-        """Sweep over a mesh and finish it, with a guard that makes these checks."""
-        self.monitor.counts = []
-        work = Work(mesh, featured, self.plan, self.monitor, self.may_run_parallel)
-        bound = self.plan.max_deviation
-        if bound is not None:
-            checks = (*checks, DeviationCheck(featured, bound, work.is_parallel))
-        guard = HoldingGuard(checks, work.is_parallel) if checks else Guard()
-        schedule = make_schedule(self.recipe, self.plan.adaptation is not None)
-        stop = run_sweeps(work, schedule, guard)
-        if has_finish(work):
-            finish(work, guard)
-        return Swept(work, stop, self.monitor.counts, self._count_flaws(before, work.mesh))
-
-    def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
+    def build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
         """Set the lengths of a mesh, mark its features, build the reference."""
         marks, length = self._set_lengths(mesh, L)
         featured = build_reference(
