@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from .batch.many import BatchItem, remesh_many
     from .batch.one_file import remesh_file
     from .html_page.page import html_report, show_html, write_html
+    from .large.remesh_large import remesh_large
+    from .large.result import LargePart, LargeResult
     from .modelling.editing import Editor, deform
     from .modelling.fairing import fair
     from .modelling.laplacians import cotangent_matrix, laplacian, vertex_areas
@@ -45,6 +47,8 @@ __all__ = [
     "EditedSurface",
     "Editor",
     "LaplacianSolver",
+    "LargePart",
+    "LargeResult",
     "MeshFile",
     "MeshFormatError",
     "MeshInputError",
@@ -68,6 +72,7 @@ __all__ = [
     "read_mesh",
     "remesh",
     "remesh_file",
+    "remesh_large",
     "remesh_many",
     "show_html",
     "smooth",
@@ -83,6 +88,8 @@ _LAZY = {
     "EditedSurface": "modelling.multiresolution",
     "Editor": "modelling.editing",
     "LaplacianSolver": "modelling.solver",
+    "LargePart": "large.result",
+    "LargeResult": "large.result",
     "MultiresolutionEditor": "modelling.multiresolution",
     "cotangent_matrix": "modelling.laplacians",
     "deform": "modelling.editing",
@@ -90,6 +97,7 @@ _LAZY = {
     "html_report": "html_page",
     "laplacian": "modelling.laplacians",
     "remesh_file": "batch.one_file",
+    "remesh_large": "large.remesh_large",
     "remesh_many": "batch.many",
     "show_html": "html_page",
     "smooth": "modelling.smoothing",

@@ -23,7 +23,7 @@ FLOORS = [
     ["sweeps", "output"],
     ["pipeline"],
     ["modelling", "batch", "pyvista_accessor"],
-    ["evolver"],
+    ["evolver", "large"],
     ["__init__"],
     ["cli"],
     ["__main__"],
