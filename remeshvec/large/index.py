@@ -48,10 +48,6 @@ class Index(NamedTuple):
         See `polyline.measure_arcs`, likewise.
     tips, spare_valence : (t,) int32
         Births of the tips, and what is added to their valence.
-    rims : (e, 2, 3) float64
-        Ends of edges that must stay and are longer than asked for.
-    rim_lengths : (n,) float64, or (0,)
-        See `LongRims`.
     face_source : (m,) int
         Face of the input.
     flipped : (m,) bool, or (0,)
@@ -76,8 +72,6 @@ class Index(NamedTuple):
     arcs: FloatArray
     tips: IndexArray
     spare_valence: IndexArray
-    rims: FloatArray
-    rim_lengths: FloatArray
     face_source: NDArray[Any]
     flipped: NDArray[np.bool_]
     cut_row: IndexArray
@@ -147,7 +141,7 @@ def _index(
     names = np.unique(featured.names).astype(np.int32)
     tips = np.flatnonzero(spare_valence * (mesh.kind == HELD))
     fixed = np.flatnonzero(mesh.kind == FIXED)
-    rims, cuts, source = featured.long_rims, prepared.cuts, prepared.face_source
+    cuts, source = prepared.cuts, prepared.face_source
     return Index(
         X=reference.X,
         origin=reference.origin,
@@ -160,8 +154,6 @@ def _index(
         arcs=reference.arcs[:, names] if has_curves else np.empty((3, 0)),
         tips=mesh.birth[tips],
         spare_valence=spare_valence[tips],
-        rims=np.empty((0, 2, 3)) if rims is None else np.stack([rims.starts, rims.ends], axis=1),
-        rim_lengths=np.empty(0) if rims is None else rims.lengths,
         face_source=source,
         flipped=np.empty(0, np.bool_) if prepared.flipped is None else prepared.flipped[source],
         cut_row=nothing if cuts is None else cuts.row,

@@ -26,18 +26,25 @@ from ..core.vocabulary import (
     IntArray,
     Mesh,
 )
+from ..mesh.blocks import make_blocks
 from ..mesh.edges import edge_keys
 from ..mesh.halfedge import build_mesh
 from ..mesh.morton import order_mesh
 from ..mesh.walk import ends_of
+from ..operations.project import read_lengths
+from ..reference.long_rims import LongRims
 from .index import Index, boxes_of
 from .reference_piece import ReferencePiece, read_reference
 from .scratch import Arrays
 from .vocabulary import SurfaceMesh, mark
 
-__all__ = ["Piece", "boxes_with_lengths", "changed_faces", "new_chords", "read_piece"]
+__all__ = ["Piece", "boxes_with_lengths", "changed_faces", "new_chords", "read_piece", "recognise"]
 
 _BOX = 256  # faces of the mesh in a box
+
+# Locked edges that are so many target lengths long raise these; to any length, in a frame below 2.
+_LONG = 4.0 / 3.0
+_ANY = 1e6
 
 
 class Piece(NamedTuple):
@@ -75,6 +82,8 @@ def read_piece(whole: SurfaceMesh, index: Index, core: IntArray, ring: IntArray)
     mesh.curve[:] = reference.local(mesh.curve)
     frozen = mark(len(vertices), mesh.origin.reshape(-1, 3)[in_ring])
     border_curve = _lock(mesh, frozen, in_ring)
+    featured = reference.featured._replace(long_rims=_lengthen(mesh, reference))
+    reference = reference._replace(featured=featured)
     return Piece(mesh, reference, vertices, frozen, in_ring, border_curve)
 
 
@@ -112,102 +121,118 @@ def _lock(mesh: Mesh, frozen: BoolArray, in_ring: BoolArray) -> IndexArray:
     return before
 
 
+def _lengthen(mesh: Mesh, reference: ReferencePiece) -> LongRims | None:
+    """Raise target lengths at locked edges that are much longer, and towards them.
+
+    The edges of a face with a long locked side cannot all be short: they would be split for ever. Where
+    locked edges are about as long as asked for, as they are after the first round, lengths stay.
+    """
+    h = np.flatnonzero(mesh.curve == FROZEN)
+    a, b = ends_of(mesh.origin, h)
+    length = np.linalg.norm(mesh.X[a, :3] - mesh.X[b, :3], axis=1)
+    is_long = length > _LONG * 0.5 * (mesh.X[a, 3] + mesh.X[b, 3])
+    if not is_long.any():
+        return None
+    a, b, length = a[is_long], b[is_long], length[is_long]
+    rims = LongRims(
+        mesh.X[a, :3], mesh.X[b, :3], np.full(len(reference.featured.reference.X), _ANY)
+    )
+    for end in (a, b):
+        np.maximum.at(mesh.X[:, 3], end, length)
+    return rims
+
+
 # -- back to the whole ------------------------------------------------------------------------
 
 
-def changed_faces(piece: Piece, result: Mesh) -> Arrays:
-    """Return the faces that took the place of the core of a piece, in numbers of the whole.
+class Changed(NamedTuple):
+    """A piece after its sweeps, with what is known again of the mesh before."""
 
-    Parameters
-    ----------
-    piece : Piece
-    result : Mesh
-        The piece after the sweeps, compact.
+    mesh: Mesh  # compact
+    vertices: IntArray  # (n,) vertex of the whole mesh for those of the ring, else ``NONE``
+    ring: BoolArray  # (m,) faces of the ring
+
+
+def recognise(piece: Piece, result: Mesh) -> Changed:
+    """Find the ring in the result of a piece. Sweeps renumber faces and vertices, but leave it as it is.
+
+    Its faces are told by the bits of their corners, and where several lie in one place by their order,
+    which stays. Vertices alone would not do: those of two sheets may share a place.
+
+    Raises
+    ------
+    RuntimeError
+        The ring has changed.
+    """
+    ring = np.flatnonzero(piece.ring)
+    locked = (result.curve == FROZEN).reshape(-1, 3).all(axis=1)
+    candidates = np.flatnonzero(locked)
+    keys = np.concatenate([_corner_bits(piece.mesh, ring), _corner_bits(result, candidates)])
+    _, key = np.unique(keys, axis=0, return_inverse=True)
+    key = key.reshape(-1)
+    wanted, found = key[: len(ring)], key[len(ring) :]
+    is_ring = np.isin(found, wanted)
+    candidates, found = candidates[is_ring], found[is_ring]
+    order, there = np.argsort(wanted, kind="stable"), np.argsort(found, kind="stable")
+    if not np.array_equal(wanted[order], found[there]):
+        raise RuntimeError("a task has changed faces that it must only see")
+    vertices = np.full(len(result.kind), NONE, np.int64)
+    before = piece.mesh.origin.reshape(-1, 3)[ring[order]]
+    vertices[result.origin.reshape(-1, 3)[candidates[there]]] = piece.vertices[before]
+    return Changed(result, vertices, mark(len(locked), candidates))
+
+
+def _corner_bits(mesh: Mesh, faces: IntArray) -> NDArray[np.int64]:
+    """Bits of the coordinates of all corners (k, 9)."""
+    return mesh.X[mesh.origin.reshape(-1, 3)[faces], :3].reshape(-1, 9).view(np.int64)
+
+
+def changed_faces(piece: Piece, changed: Changed) -> Arrays:
+    """Return the faces that took the place of the core of a piece, in numbers of the whole.
 
     Returns
     -------
     arrays : dict
         ``F (k, 3)`` holds vertices of the ring as ``-1 - vertex`` and new ones as rows of ``X``,
         ``kind`` and ``birth``; ``curve (k, 3)`` and ``source (k,)``.
-
-    Raises
-    ------
-    RuntimeError
-        A vertex of the ring has not stayed.
     """
-    whole = _whole_vertices(piece, result)
-    F = result.origin.reshape(-1, 3)
-    is_core = ~_same_faces(whole[F], piece.vertices[piece.mesh.origin.reshape(-1, 3)[piece.ring]])
-    if len(F) - int(is_core.sum()) != int(piece.ring.sum()):
-        raise RuntimeError("a task has changed faces that it must only see")
-    F = F[is_core]
-    new = np.flatnonzero((whole == NONE) & mark(len(whole), F))
-    number = -1 - whole
+    result, is_core = changed.mesh, ~changed.ring
+    F = result.origin.reshape(-1, 3)[is_core]
+    new = np.flatnonzero((changed.vertices == NONE) & mark(len(result.kind), F))
+    _reset_lengths(piece, result)
+    number = -1 - changed.vertices
     number[new] = np.arange(len(new))
+    h = np.flatnonzero(np.repeat(is_core, 3))
     return {
         "F": number[F],
         "X": result.X[new],
         "kind": result.kind[new],
         "birth": piece.reference.whole(result.birth[new]),
-        "curve": _unlocked(piece, whole, result, np.flatnonzero(np.repeat(is_core, 3))).reshape(
-            -1, 3
-        ),
+        "curve": _unlocked(piece, changed, h).reshape(-1, 3),
         "source": piece.reference.faces[result.source[is_core]].astype(np.int32),
     }
 
 
-def _whole_vertices(piece: Piece, result: Mesh) -> IntArray:
-    """Vertices of the whole mesh that vertices of the result are; ``NONE`` for those of the core.
-
-    The sweeps renumber vertices. Held ones are told by their place and their birth, which stay.
-    """
-    frozen = np.flatnonzero(piece.frozen)
-    held = np.flatnonzero(np.isin(result.kind, (HELD, PINNED, FIXED)))
-    keys = np.concatenate([_keys(piece.mesh, frozen), _keys(result, held)])
-    _, key = np.unique(keys, axis=0, return_inverse=True)
-    key = key.reshape(-1)
-    known = np.full(int(key.max(initial=-1)) + 1, NONE, np.int64)
-    known[key[: len(frozen)]] = piece.vertices[frozen]
-    whole = np.full(len(result.kind), NONE, np.int64)
-    whole[held] = known[key[len(frozen) :]]
-    found = np.unique(whole[whole != NONE])
-    if not np.array_equal(found, np.unique(piece.vertices[frozen])):
-        raise RuntimeError("a task has moved vertices that it must only see")
-    return whole
+def _reset_lengths(piece: Piece, result: Mesh) -> None:
+    """Let target lengths be those of the reference again, where they were raised."""
+    if piece.reference.featured.long_rims is None:
+        return
+    reference = piece.reference.featured.reference
+    asked = reference.X[:, 3]
+    if asked.min() == asked.max():
+        result.X[result.kind != FIXED, 3] = asked[0]
+    else:
+        read_lengths(result, make_blocks(result), reference, False)
 
 
-def _keys(mesh: Mesh, v: NDArray[Any]) -> NDArray[np.int64]:
-    """Bits of coordinates, and births (k, 4)."""
-    return np.column_stack([mesh.X[v, :3].view(np.int64), mesh.birth[v].astype(np.int64)])
-
-
-def _same_faces(F: IntArray, known: IntArray) -> BoolArray:
-    """Mark the faces that are among others, in the same winding; ``NONE`` is no vertex of theirs."""
-    vertices = np.unique(known)
-    place = np.searchsorted(vertices, F)
-    place[place == len(vertices)] = 0
-    is_near = (vertices[place] == F).all(axis=1) if len(vertices) else np.zeros(len(F), np.bool_)
-    keys = _face_keys(np.searchsorted(vertices, known), len(vertices))
-    found = np.zeros(len(F), np.bool_)
-    found[is_near] = np.isin(_face_keys(place[is_near], len(vertices)), keys)
-    return found
-
-
-def _face_keys(F: IntArray, n: int) -> IntArray:
-    """One number per face of less than two million vertices, from whichever corner it starts."""
-    first = F.argmin(axis=1)
-    a, b, c = (F[np.arange(len(F)), (first + i) % 3].astype(np.int64) for i in range(3))
-    return np.asarray((a * n + b) * n + c)
-
-
-def _unlocked(piece: Piece, whole: IntArray, result: Mesh, h: IntArray) -> IndexArray:
+def _unlocked(piece: Piece, changed: Changed, h: IntArray) -> IndexArray:
     """Curves of half-edges in numbers of the whole; locks of the border are taken off."""
-    border = _border(piece)
+    border, result = _border(piece), changed.mesh
     known = _directed(piece.vertices[ends_of(piece.mesh.origin, border)])
     order = np.argsort(known)
     curve = result.curve[h].copy()
     locked = np.flatnonzero(curve == FROZEN)
-    keys = _directed(whole[ends_of(result.origin, h[locked])])
+    keys = _directed(changed.vertices[ends_of(result.origin, h[locked])])
     if len(known):
         place = np.minimum(np.searchsorted(known[order], keys), len(known) - 1)
         is_border = known[order][place] == keys
@@ -227,18 +252,17 @@ def _directed(ends: NDArray[Any]) -> IntArray:
     return np.asarray((ends[0].astype(np.int64) << 31) + ends[1])
 
 
-def new_chords(piece: Piece, result: Mesh, shared: IntArray) -> IndexArray:
+def new_chords(piece: Piece, changed: Changed, shared: IntArray) -> IndexArray:
     """List new edges between two vertices that other parts see too, each by its later half-edge.
 
     Another part may have made an edge between the same two: together they would be one of four faces.
     """
-    whole = _whole_vertices(piece, result)
+    result, whole = changed.mesh, changed.vertices.copy()
     whole[~np.isin(whole, shared)] = NONE
     h = np.flatnonzero((result.twin < np.arange(len(result.twin))) & (result.curve != FROZEN))
     ends = whole[ends_of(result.origin, h)]
     both = (ends != NONE).all(axis=0)
     h, ends = h[both], ends[:, both]
-    n = int(piece.vertices.max()) + 1
-    origin = piece.mesh.origin
+    n, origin = int(piece.vertices.max()) + 1, piece.mesh.origin
     old = edge_keys(piece.vertices[ends_of(origin, np.arange(origin.size))], n)
     return np.asarray(h[~np.isin(edge_keys(ends, n), old)], np.int32)

@@ -15,7 +15,6 @@ from ..core.vocabulary import NONE, BoolArray, FloatArray, IndexArray, IntArray
 from ..features.polyline import Polylines
 from ..reference.build import FeaturedReference
 from ..reference.bvh import Surface
-from ..reference.long_rims import LongRims
 from ..reference.surface import Reference
 from .index import CELL, Index
 
@@ -73,11 +72,7 @@ def read_reference(index: Index, boxes: FloatArray, needed: NDArray[Any]) -> Ref
     reference = Reference(
         Surface(X, origin, twin, False), X, origin, polylines.neighbours, polylines.arcs
     )
-    rims = None
-    if len(index.rims):
-        starts, ends = (np.array(index.rims[:, side]) for side in (0, 1))
-        rims = LongRims(starts, ends, np.array(index.rim_lengths[vertices]))
-    featured = FeaturedReference(reference, None, None, rims, names, names, {})
+    featured = FeaturedReference(reference, None, None, None, names, names, {})
     return ReferencePiece(featured, faces, cell_start)
 
 

@@ -30,7 +30,7 @@ from ..sweeps.plan import Plan
 from ..sweeps.rounds import run_rounds
 from ..sweeps.work import Work, is_large
 from .index import Index, load_index
-from .piece import changed_faces, new_chords, read_piece
+from .piece import changed_faces, new_chords, read_piece, recognise
 from .reference_piece import read_reference
 from .scratch import Arrays, load, save_task
 from .vocabulary import Parts, SurfaceMesh, load_mesh
@@ -135,10 +135,11 @@ def _sweep(
     monitor = Monitor(Stopwatch())
     sweeper = Sweeper(piece.reference.featured, plan, monitor, may_run_parallel, parallel)
     result = sweeper.sweep([piece.mesh.copy()]).work.mesh
-    chords = new_chords(piece, result, np.asarray(parts.shared))
+    changed = recognise(piece, result)
+    chords = new_chords(piece, changed, np.asarray(parts.shared))
     if len(chords):
-        result = split_edges(result, make_blocks(result), chords, parallel)
-    return changed_faces(piece, result)
+        changed = recognise(piece, split_edges(result, make_blocks(result), chords, parallel))
+    return changed_faces(piece, changed)
 
 
 def _move(
