@@ -46,8 +46,10 @@ class Index(NamedTuple):
         See `polyline.join_edges`, at the names only.
     arcs : (3, j) float64
         See `polyline.measure_arcs`, likewise.
-    tips, spare_valence : (t,) int32
-        Births of the tips, and what is added to their valence.
+    tips : (t, 3) float64
+        Places of the tips.
+    spare_valence : (t,) int32
+        What is added to their valence.
     face_source : (m,) int
         Face of the input.
     flipped : (m,) bool, or (0,)
@@ -70,7 +72,7 @@ class Index(NamedTuple):
     names: IndexArray
     neighbours: IndexArray
     arcs: FloatArray
-    tips: IndexArray
+    tips: FloatArray
     spare_valence: IndexArray
     face_source: NDArray[Any]
     flipped: NDArray[np.bool_]
@@ -152,7 +154,7 @@ def _index(
         if has_curves
         else np.empty((2, 0), np.int32),
         arcs=reference.arcs[:, names] if has_curves else np.empty((3, 0)),
-        tips=mesh.birth[tips],
+        tips=mesh.X[tips, :3],
         spare_valence=spare_valence[tips],
         face_source=source,
         flipped=np.empty(0, np.bool_) if prepared.flipped is None else prepared.flipped[source],

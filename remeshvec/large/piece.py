@@ -38,7 +38,15 @@ from .reference_piece import ReferencePiece, read_reference
 from .scratch import Arrays
 from .vocabulary import SurfaceMesh, mark
 
-__all__ = ["Piece", "boxes_with_lengths", "changed_faces", "new_chords", "read_piece", "recognise"]
+__all__ = [
+    "Piece",
+    "boxes_with_lengths",
+    "changed_faces",
+    "new_chords",
+    "read_piece",
+    "recognise",
+    "reset_lengths",
+]
 
 _BOX = 256  # faces of the mesh in a box
 
@@ -72,7 +80,7 @@ def read_piece(whole: SurfaceMesh, index: Index, core: IntArray, ring: IntArray)
     mesh.kind[:] = whole.kind[vertices]
     mesh.curve[:] = whole.curve[faces].ravel()
     birth, source = whole.birth[vertices], whole.source[faces]
-    _add_spare_valence(mesh, index, birth)
+    _add_spare_valence(mesh, index)
     in_ring = np.isin(faces, ring)
     named = mesh.curve[mesh.curve >= 0]
     boxes = boxes_with_lengths(mesh.X, mesh.origin.reshape(-1, 3))
@@ -87,16 +95,17 @@ def read_piece(whole: SurfaceMesh, index: Index, core: IntArray, ring: IntArray)
     return Piece(mesh, reference, vertices, frozen, in_ring, border_curve)
 
 
-def _add_spare_valence(mesh: Mesh, index: Index, birth: IndexArray) -> None:
-    """Add what tips lack of six faces; a tip keeps its birth as long as it is held."""
+def _add_spare_valence(mesh: Mesh, index: Index) -> None:
+    """Add what tips lack of six faces; tips stay where they are."""
     held = np.flatnonzero(mesh.kind == HELD)
     if not (len(held) and len(index.tips)):
         return
-    order = np.argsort(index.tips)
-    tips = index.tips[order]
-    place = np.minimum(np.searchsorted(tips, birth[held]), len(tips) - 1)
-    is_tip = tips[place] == birth[held]
-    mesh.valence_excess[held[is_tip]] += index.spare_valence[order][place[is_tip]]
+    points = np.concatenate([index.tips, mesh.X[held, :3]])
+    _, place = np.unique(points.view(np.int64), axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    spare = np.zeros(int(place.max()) + 1, np.int32)
+    spare[place[: len(index.tips)]] = index.spare_valence
+    mesh.valence_excess[held] += spare[place[len(index.tips) :]]
 
 
 def boxes_with_lengths(X: FloatArray, F: IndexArray) -> FloatArray:
@@ -199,7 +208,7 @@ def changed_faces(piece: Piece, changed: Changed) -> Arrays:
     result, is_core = changed.mesh, ~changed.ring
     F = result.origin.reshape(-1, 3)[is_core]
     new = np.flatnonzero((changed.vertices == NONE) & mark(len(result.kind), F))
-    _reset_lengths(piece, result)
+    reset_lengths(piece, result)
     number = -1 - changed.vertices
     number[new] = np.arange(len(new))
     h = np.flatnonzero(np.repeat(is_core, 3))
@@ -213,7 +222,7 @@ def changed_faces(piece: Piece, changed: Changed) -> Arrays:
     }
 
 
-def _reset_lengths(piece: Piece, result: Mesh) -> None:
+def reset_lengths(piece: Piece, result: Mesh) -> None:
     """Let target lengths be those of the reference again, where they were raised."""
     if piece.reference.featured.long_rims is None:
         return

@@ -43,7 +43,7 @@ from .vocabulary import load_mesh
 if TYPE_CHECKING:
     from typing import Unpack
 
-__all__ = ["remesh_large"]
+__all__ = ["remesh_large", "remesh_parts", "write_scratch"]
 
 # Parts must be much wider than the bands around their cuts.
 _LEAST_PART = 10_000
@@ -150,11 +150,9 @@ def remesh_large(
         _check_disk(folder, len(mesh[1]), expected_work(*mesh, L))
         enter_scratch(folder, recipe_of(surface, L, wanted, part_faces), resume)
         if not (folder / "index").is_dir():
-            _write_index(mesh, L, wanted, recipe, folder)
+            write_scratch(mesh, L, wanted, recipe, folder)
         del mesh
-        _remesh_parts(
-            surface, folder, engine, (wanted, recipe), part_faces, progress, target, start
-        )
+        remesh_parts(surface, folder, engine, (wanted, recipe), part_faces, progress, target, start)
         leave_scratch(folder)
     result = open_result(arrays_folder(target), surface.F, len(surface.V))
     if target.suffix.lower() in SUFFIXES:
@@ -234,7 +232,7 @@ def _remesh_whole(surface: Source, L: Any, wanted: RemeshOptions, target: Path) 
     )
 
 
-def _write_index(
+def write_scratch(
     mesh: tuple[FloatArray, IntArray], L: Any, wanted: RemeshOptions, recipe: Recipe, folder: Path
 ) -> None:
     """Prepare the surface, and write it as files."""
@@ -249,7 +247,7 @@ def _write_index(
         write_index(job, constraints, folder / "index", folder / "mesh-0")
 
 
-def _remesh_parts(
+def remesh_parts(
     surface: Source,
     folder: Path,
     engine: Engine,

@@ -30,7 +30,7 @@ from ..sweeps.plan import Plan
 from ..sweeps.rounds import run_rounds
 from ..sweeps.work import Work, is_large
 from .index import Index, load_index
-from .piece import changed_faces, new_chords, read_piece, recognise
+from .piece import changed_faces, new_chords, read_piece, recognise, reset_lengths
 from .reference_piece import read_reference
 from .scratch import Arrays, load, save_task
 from .vocabulary import Parts, SurfaceMesh, load_mesh
@@ -152,6 +152,7 @@ def _move(
     work = Work(piece.mesh, featured, plan, Monitor(Stopwatch()), may_run_parallel)
     work.monitor.begin_sweep()
     run_rounds(work, _MOVES, flips=False)
+    reset_lengths(piece, piece.mesh)
     owned = np.flatnonzero(np.isin(piece.vertices, parts.of("moved", task.part)) & ~piece.frozen)
     birth = piece.reference.whole(piece.mesh.birth[owned])
     return {"vertices": piece.vertices[owned], "X": piece.mesh.X[owned], "birth": birth}
