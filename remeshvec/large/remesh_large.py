@@ -139,6 +139,7 @@ def remesh_large(
     part_faces = arguments.count(part_faces, "part_faces", low=_LEAST_PART)
     resume, progress = arguments.flag(resume, "resume"), arguments.flag(progress, "progress")
     target = _target(out)
+    folder = _scratch(scratch, target)
     surface = read_source(source)
     mesh = as_mesh(surface.V, surface.F)
     L = read_lengths(mesh[0], L)
@@ -146,7 +147,6 @@ def remesh_large(
         del mesh
         _remesh_whole(surface, L, wanted, target)
     else:
-        folder = _scratch(scratch, target)
         _check_disk(folder, len(mesh[1]), expected_work(*mesh, L))
         enter_scratch(folder, recipe_of(surface, L, wanted, part_faces), resume)
         if not (folder / "index").is_dir():
