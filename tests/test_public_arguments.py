@@ -34,6 +34,7 @@ import remeshvec
 from remeshvec import (
     Adaptive,
     BatchError,
+    LargeResult,
     MeshFormatError,
     RemeshResult,
     RemeshvecError,
@@ -48,6 +49,7 @@ MESH = (V, F)
 RECORDS = {
     "BatchItem",
     "Defects",
+    "LargePart",
     "MeshFile",
     "Quality",
     "Report",
@@ -121,6 +123,10 @@ def result():
     return remesh(V, F, preset="fast", iterations=1)
 
 
+def large_result():
+    return remeshvec.remesh_large(MESH, out="out", preset="fast", iterations=1)
+
+
 TABLE = {
     remesh: Entry(REMESH, lambda: {"V": V, "F": F}),
     remeshvec.find_creases: Entry(
@@ -185,6 +191,29 @@ TABLE = {
         },
         lambda: {"items": [MESH], "workers": 1},
     ),
+    remeshvec.remesh_large: Entry(
+        {
+            "source": [None, 3, "", "absent.ply", (V,), (V, F, V), ("V.npy", "F.npy")],
+            "L": NOT_LENGTHS,
+            "out": [*NOT_PATHS, "absent/out", "out.obj", "in.obj"],
+            "scratch": [value for value in NOT_PATHS if value is not None],
+            "client": [3, "tcp://host:8786", object()],
+            "workers": NOT_COUNTS,
+            "part_faces": [*NOT_COUNTS, 9_999],
+            "resume": NOT_FLAGS,
+            "progress": NOT_FLAGS,
+        },
+        lambda: {"source": MESH, "out": "out", "workers": 1},
+    ),
+    LargeResult.parts: Entry({"faces": NOT_COUNTS}, lambda: {"self": large_result()}),
+    LargeResult.transfer: Entry(
+        {
+            "values": [*NOT_VALUES, "absent.npy"],
+            "out": [3, b"a", "a.txt", "absent/a.npy"],
+            "method": NOT_WORDS,
+        },
+        lambda: {"self": large_result(), "values": V},
+    ),
     RemeshResult.show: Entry(
         {"title": NOT_TEXTS, "up": NOT_WORDS}, lambda: {"self": result()}
     ),
@@ -242,7 +271,8 @@ def test_every_public_function_is_in_one_table(place):
         value = getattr(place, name)
         is_error = inspect.isclass(value) and issubclass(value, Exception)
         if callable(value) and not is_error and name not in records:
-            wanted = [value] if value is not RemeshResult else []  # only `remesh` makes results
+            # Only calls make results.
+            wanted = [value] if value not in (RemeshResult, LargeResult) else []
             wanted += public_methods(value) if inspect.isclass(value) else []
             for one in wanted:
                 assert sum(one in table for table in tables) == 1, one
