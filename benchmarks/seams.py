@@ -2,11 +2,12 @@
 
 ``python -m benchmarks.seams 16 4`` cuts the mesh of 16 times 10,000 faces into four parts. A zone holds
 the faces within three target lengths of the cuts or rims of a round and away from those of later ones;
-the interior is twelve away from all.
+the interior is twelve away from all. ``python -m benchmarks.seams memory 64 4`` measures memory instead.
 """
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -143,5 +144,32 @@ def main(times: int, count: int) -> None:
     )
 
 
+CHILD = """
+import resource, sys
+from remeshvec import remesh_large
+remesh_large(sys.argv[1], float(sys.argv[2]), out=sys.argv[1] + "/out", part_faces=int(sys.argv[3]),
+             workers=2)
+for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN):
+    print(resource.getrusage(who).ru_maxrss // 1024)
+"""
+
+
+def memory(times: int, count: int) -> None:
+    """Print the largest resident memory of the parent and of a worker, of two."""
+    sample = load(made(times))
+    with tempfile.TemporaryDirectory(prefix="remeshvec-seams-") as folder:
+        for name, array in (("V", sample.V), ("F", sample.F.astype(np.int32))):
+            np.save(Path(folder) / f"{name}.npy", array)
+        command = [sys.executable, "-c", CHILD, folder, repr(float(sample.length))]
+        command.append(str(-(-len(sample.F) // count)))
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    parent, worker = done.stdout.split()
+    print(f"{sample.name}, {len(sample.F):,} faces, {count} parts, two workers: largest resident "
+          f"memory of the parent {parent} MB, of a worker {worker} MB")  # fmt: skip
+
+
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:3]))
+    if sys.argv[1] == "memory":
+        memory(*map(int, sys.argv[2:4]))
+    else:
+        main(*map(int, sys.argv[1:3]))

@@ -151,29 +151,24 @@ def large_parser() -> argparse.ArgumentParser:
         epilog=LARGE_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    result.add_argument(
-        "input", metavar="INPUT", help="mesh file, or a folder with V.npy and F.npy"
-    )
-    result.add_argument(
+    add = result.add_argument
+    add("input", metavar="INPUT", help="mesh file, or a folder with V.npy and F.npy")
+    add(
         "-o",
         "--out",
         metavar="OUT",
         required=True,
         help="PLY or STL file to write, with a folder of arrays beside it; or that folder alone",
     )
-    result.add_argument(
-        "-l", "--length", type=_positive_number, metavar="L", help="target edge length"
-    )
-    result.add_argument("--lengths", metavar="FILE", help="target edge length at every vertex")
-    result.add_argument(
+    add("-l", "--length", type=_positive_number, metavar="L", help="target edge length")
+    add("--lengths", metavar="FILE", help="target edge length at every vertex")
+    add(
         "--gradation",
         type=_positive_number,
         metavar="X",
         help="largest ratio of the lengths at the ends of an edge (default 1.5)",
     )
-    result.add_argument(
-        "--scratch", metavar="DIR", help="folder for the work (default OUT.scratch)"
-    )
+    add("--scratch", metavar="DIR", help="folder for the work (default OUT.scratch)")
     who = result.add_mutually_exclusive_group()
     who.add_argument(
         "--workers", type=_at_least_one, metavar="N", help="processes (default: all cores)"
@@ -181,14 +176,10 @@ def large_parser() -> argparse.ArgumentParser:
     who.add_argument(
         "--scheduler", metavar="ADDRESS", help="of a Dask scheduler, whose workers do the work"
     )
-    result.add_argument(
-        "--part-faces", type=_at_least_one, metavar="N", help="faces in a part (default 2000000)"
-    )
-    result.add_argument(
-        "--restart", action="store_true", help="do not go on with a call that was interrupted"
-    )
-    result.add_argument("--quiet", action="store_true", help="show errors only")
-    result.add_argument("--version", action="version", version=f"remeshvec {__version__}")
+    add("--part-faces", type=_at_least_one, metavar="N", help="faces in a part (default 2000000)")
+    add("--restart", action="store_true", help="do not go on with a call that was interrupted")
+    add("--quiet", action="store_true", help="show errors only")
+    add("--version", action="version", version=f"remeshvec {__version__}")
     keep = result.add_argument_group("what to keep")
     _add_constraints(keep)
     _add_files_of_constraints(keep)

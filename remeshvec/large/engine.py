@@ -80,15 +80,26 @@ class Engine:
         # Dask answers a call that it remembers from memory; the files may have gone since.
         once = token_hex(8)
         futures = [client.submit(run_task, task, once) for task in tasks]
-        for task, future in zip(tasks, futures, strict=True):
-            try:
-                future.result()
-            except RemeshvecError:
-                raise
-            except Exception as error:
-                name = type(error).__name__
-                raise WorkerError(f"{task.round}, part {task.part}: {name}: {error}") from error
-            yield task
+        try:
+            for task, future in zip(tasks, futures, strict=True):
+                _wait_for(task, future)
+                yield task
+        finally:
+            for future in futures:
+                cancel = getattr(future, "cancel", None)
+                if cancel is not None:  # those that are done take no notice
+                    cancel()
+
+
+def _wait_for(task: Task, future: Future) -> None:
+    """Wait for a task; errors that are not the package's own name it."""
+    try:
+        future.result()
+    except RemeshvecError:
+        raise
+    except Exception as error:
+        name = type(error).__name__
+        raise WorkerError(f"{task.round}, part {task.part}: {name}: {error}") from error
 
 
 def _may_be_repeated(error: Exception) -> bool:

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiler import compile_notice
 from ..core.stopwatch import Stopwatch
-from ..core.threads import thread_scope
+from ..core.threads import numba_version, thread_scope
 from ..core.version import __version__
 from ..core.vocabulary import FIXED, NONE, FloatArray, IntArray, Mesh
 from ..errors import WorkerError
@@ -89,7 +88,7 @@ class Task:
 
 def versions() -> dict[str, str]:
     """Versions of the packages on which the bits of a result depend."""
-    return {"remeshvec": __version__, "numpy": np.__version__, "numba": numba.__version__}
+    return {"remeshvec": __version__, "numpy": np.__version__, "numba": numba_version}
 
 
 def run_task(task: Task, _: Any = None) -> str:
@@ -133,7 +132,13 @@ def _sweep(
     plan = Plan(task.recipe, task.scale, task.gradation)
     parallel = may_run_parallel and is_large(len(piece.ring))
     monitor = Monitor(Stopwatch())
-    sweeper = Sweeper(piece.reference.featured, plan, monitor, may_run_parallel, parallel)
+    # Cuts are jagged: faces fold there, until a later round remeshes them. To sweep with a guard
+    # against that takes several times as long.
+    at_cuts = piece.vertices[np.isin(piece.vertices, parts.shared)]
+    tolerated = np.array(whole.X[at_cuts, :3]) if len(at_cuts) else None
+    sweeper = Sweeper(
+        piece.reference.featured, plan, monitor, may_run_parallel, parallel, tolerated
+    )
     result = sweeper.sweep([piece.mesh.copy()]).work.mesh
     changed = recognise(piece, result)
     chords = new_chords(piece, changed, np.asarray(parts.shared))

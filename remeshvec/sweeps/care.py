@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..core.vocabulary import Mesh
+from ..core.vocabulary import FloatArray, Mesh
 from ..reference.build import FeaturedReference
 from .deviation import DeviationCheck
 from .finish import finish, has_finish
@@ -48,6 +48,8 @@ class Sweeper:
         Whether large meshes may use more than one thread.
     parallel : bool
         Whether the checks do.
+    tolerated : (k, 3) float64, optional
+        Places whose folds need no care, see `FoldCheck`.
     """
 
     def __init__(
@@ -57,12 +59,14 @@ class Sweeper:
         monitor: Monitor,
         may_run_parallel: bool,
         parallel: bool,
+        tolerated: FloatArray | None = None,
     ) -> None:
         self.featured = featured
         self.plan = plan
         self.monitor = monitor
         self.may_run_parallel = may_run_parallel
         self.parallel = parallel
+        self.tolerated = tolerated
 
     def sweep(self, meshes: list[Mesh]) -> Swept:
         """Sweep over the mesh in a list, which is emptied: nothing holds it once it is replaced.
@@ -86,11 +90,12 @@ class Sweeper:
         more than it must where an input crosses itself.
         """
         avoids_crossings = self.plan.recipe.avoid_intersections
-        folds = FoldCheck(self.parallel)
+        folds = FoldCheck(self.parallel, self.tolerated)
         crossings = CrossingCheck(self.parallel, avoids_crossings)
         has_folds = best.n_flaws > 0
         if has_folds and self._may_mend():
-            mend_folds(best.work, before, make_schedule(self.plan.recipe)[-1])
+            last = make_schedule(self.plan.recipe)[-1]
+            mend_folds(best.work, before, last, self.tolerated)
             best = self._judged(best, before)
         guards: list[tuple[Check, ...]] = [(folds,), (folds, crossings)]
         for checks in guards[avoids_crossings or not has_folds :]:
@@ -119,7 +124,7 @@ class Sweeper:
         if self.monitor.is_cancelled:
             return 0
         crossings = self.plan.recipe.avoid_intersections
-        return count_new_flaws(before, after, crossings, self.parallel)
+        return count_new_flaws(before, after, crossings, self.parallel, self.tolerated)
 
     def _swept(self, mesh: Mesh, before: Mesh, checks: tuple[Check, ...]) -> Swept:
         """Sweep over a mesh and finish it, with a guard that makes these checks."""

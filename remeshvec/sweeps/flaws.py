@@ -59,10 +59,18 @@ class _Places:
 
 
 class FoldCheck:
-    """No folds and no faces without area that were not there."""
+    """No folds and no faces without area that were not there.
 
-    def __init__(self, parallel: bool) -> None:
+    Parameters
+    ----------
+    parallel : bool
+    tolerated : (k, 3) float64, optional
+        Places at which there may be flaws as if there had been some before, however many.
+    """
+
+    def __init__(self, parallel: bool, tolerated: FloatArray | None = None) -> None:
         self.parallel = parallel
+        self.tolerated = tolerated
 
     def remember(self, mesh: Mesh, tree: LazyTree) -> None:
         """Note where the mesh is folded, and where faces have no area."""
@@ -75,9 +83,14 @@ class FoldCheck:
         edge = np.repeat(np.arange(len(h)), steps)
         place = np.arange(len(edge)) - np.repeat(np.cumsum(steps) - steps, steps)
         share = ((place + 0.5) / steps[edge])[:, None]
-        self.folds = _Places(a[edge] + share * (b - a)[edge], float(length.sum()))
+        self.folds = self._places(a[edge] + share * (b - a)[edge], float(length.sum()))
         flat = find_flat_faces(mesh, vectors)
-        self.flat = _Places(self._middles(mesh, flat), float(len(flat)))
+        self.flat = self._places(self._middles(mesh, flat), float(len(flat)))
+
+    def _places(self, points: FloatArray, amount: float) -> _Places:
+        if self.tolerated is None:
+            return _Places(points, amount)
+        return _Places(np.concatenate([points, self.tolerated]), np.inf)
 
     def offenders(self, mesh: Mesh, tree: LazyTree) -> Offenders:
         """Corners of the faces at new folded edges, and of new faces without area."""
@@ -131,14 +144,20 @@ class CrossingCheck:
         return alive[found], corners.mean(axis=1), 0.5 * np.linalg.norm(normals, axis=1)
 
 
-def count_new_flaws(before: Mesh, after: Mesh, crossings: bool, parallel: bool) -> int:
-    """Count the vertices at flaws that a mesh has and an earlier one has not.
+def count_new_flaws(
+    before: Mesh,
+    after: Mesh,
+    crossings: bool,
+    parallel: bool,
+    tolerated: FloatArray | None = None,
+) -> int:
+    """Count the vertices at flaws that a mesh has and an earlier one has not, but for those tolerated.
 
     Crossings count only if asked for: to look for them takes longer.
     """
     count = 0
     if has_folds(after, make_blocks(after), parallel):
-        check = FoldCheck(parallel)
+        check = FoldCheck(parallel, tolerated)
         check.remember(before, lazy_tree(before, parallel))
         count += check.offenders(after, lazy_tree(after, parallel)).size
     return count + (_new_crossings(before, after, True, parallel)[0] if crossings else 0)

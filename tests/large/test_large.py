@@ -102,6 +102,24 @@ def test_labels_sizes_and_fixed_elements_work_across_parts(tmp_path):
     np.testing.assert_allclose(result.lengths[free], wanted[free], rtol=0.02)
 
 
+def test_dirt_is_mended_before_the_cuts(tmp_path):
+    """Faces of the other winding, without area, twice: births name the caller's own faces."""
+    V, F = MESHES["ball"]()
+    rng = np.random.default_rng(5)
+    turned = rng.choice(len(F), 500, replace=False)
+    F = F.copy()
+    F[turned] = F[turned][:, ::-1]
+    F = np.concatenate([F[:100], [[5, 5, 9]], F[:1], F[100:]])
+    V = np.concatenate([V, [[9.0, 9.0, 9.0]]])
+    result = remesh_large((V, F), 0.03, out=tmp_path / "out", workers=1, part_faces=PART)
+    found = quality(result.V, result.F)
+    assert (found.euler_number, found.components, found.boundary_loops) == (2, 1, 0)
+    assert found.volume == pytest.approx(4 / 3 * np.pi, rel=0.01)
+    born = (V[F[result.birth_face]] * result.birth_barycentric[:, :, None]).sum(axis=1)
+    assert np.abs(born - result.V).max() < 1e-9 * 0.03
+    assert {"flipped_faces", "degenerate_faces", "duplicate_faces"} <= result.report["dirt"].keys()
+
+
 def test_data_follow(large, tmp_path):
     case = large("ball")
     np.save(tmp_path / "x.npy", case.V.astype(np.float32))
