@@ -185,7 +185,7 @@ def _target(out: Any) -> Path:
             f"{folder} exists and is not the result of an earlier call; choose another"
         )
     if not folder.parent.is_dir():
-        raise OptionError(f"there is no folder {folder.parent}")
+        raise OptionError(f"out = {target} cannot be written: there is no folder {folder.parent}")
     return target
 
 
