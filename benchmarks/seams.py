@@ -1,8 +1,9 @@
 """Quality along the cuts of a surface in parts, beside one call at the same places.
 
-``python -m benchmarks.seams 16 4`` cuts the mesh of 16 times 10,000 faces into four parts. A zone holds
+``python -m benchmarks.seams pretzel-x100 8`` cuts a mesh into about eight parts. A zone holds
 the faces within three target lengths of the cuts or rims of a round and away from those of later ones;
-the interior is twelve away from all. ``python -m benchmarks.seams memory 64 4`` measures memory instead.
+the interior is twelve away from all. ``python -m benchmarks.seams memory pretzel-x100 4`` measures
+memory instead.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from remeshvec.large.scratch import read_json
 from remeshvec.large.source import read_source
 from remeshvec.large.tasks import SWEEP
 
-from .meshes import FloatArray, IntArray, load, made
+from .meshes import FloatArray, IntArray, load
 from .tables import table
 
 NEAR, FAR = 3.0, 12.0
@@ -114,9 +115,9 @@ def zones(
             "interior": far > FAR * L}  # fmt: skip
 
 
-def main(times: int, count: int) -> None:
+def main(name: str, count: int) -> None:
     """Print a table of zones, in parts and in one call, and the CPU time of both."""
-    sample = load(made(times))
+    sample = load(name)
     V, F, L = sample.V, sample.F, sample.length
     remesh(V, F[: len(F) // 50], L)  # loads the kernels
     with tempfile.TemporaryDirectory(prefix="remeshvec-seams-") as folder:
@@ -154,9 +155,9 @@ for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN):
 """
 
 
-def memory(times: int, count: int) -> None:
+def memory(name: str, count: int) -> None:
     """Print the largest resident memory of the parent and of a worker, of two."""
-    sample = load(made(times))
+    sample = load(name)
     with tempfile.TemporaryDirectory(prefix="remeshvec-seams-") as folder:
         for name, array in (("V", sample.V), ("F", sample.F.astype(np.int32))):
             np.save(Path(folder) / f"{name}.npy", array)
@@ -170,6 +171,6 @@ def memory(times: int, count: int) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1] == "memory":
-        memory(*map(int, sys.argv[2:4]))
+        memory(sys.argv[2], int(sys.argv[3]))
     else:
-        main(*map(int, sys.argv[1:3]))
+        main(sys.argv[1], int(sys.argv[2]))
