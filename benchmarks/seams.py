@@ -28,7 +28,7 @@ from remeshvec.large.request import read_large_options
 from remeshvec.large.scratch import load as load_arrays
 from remeshvec.large.scratch import read_json
 from remeshvec.large.source import read_source
-from remeshvec.large.tasks import SWEEP
+from remeshvec.large.tasks import MOVE
 
 from .meshes import FloatArray, IntArray, load
 from .tables import table
@@ -91,7 +91,7 @@ def in_parts(
     frame = read_json(scratch / "index" / "notes.json")
     points = {}
     for step in ROUNDS:
-        if step.kind == SWEEP:
+        if step.kind != MOVE:
             for noun in ("cuts", "rims"):
                 found = load_arrays(scratch / step.name / "parts", noun)[noun]
                 points[f"{noun} of {step.name}"] = found / frame["scale"] + np.array(

@@ -50,7 +50,8 @@ __all__ = [
 
 _BOX = 256  # faces of the mesh in a box
 
-# Locked edges that are so many target lengths long raise these; to any length, in a frame below 2.
+# Locked edges that are so many target lengths long raise these; to any length, in a frame below 2. With
+# 2 in place of 4/3 splits do not end.
 _LONG = 4.0 / 3.0
 _ANY = 1e6
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.vocabulary import BoolArray, FloatArray, IndexArray, IntArray
+from .geometry import smallest_angle_cosines
 from .partition import (
     border_of,
     centroids_of,
@@ -29,7 +30,7 @@ from .partition import (
     near_faces,
 )
 from .scratch import load, save_arrays
-from .tasks import MOVE, OVERLAP, SWEEP
+from .tasks import MOVE, OVERLAP, REPAIR, SWEEP
 from .vocabulary import Parts, SurfaceMesh, group_rows, mark
 
 __all__ = ["ROUNDS", "Plan", "Round", "even_runs", "points_of", "save_plan"]
@@ -96,7 +97,7 @@ def _repairs(plan: Plan, mesh: SurfaceMesh) -> Parts:
     """Take what lies around thin faces near lines that were frozen, in whole components."""
     centroids = centroids_of(mesh)
     faces = np.flatnonzero(near_faces(mesh, centroids, _frozen_lines(plan), _SETTLED))
-    thin = faces[_smallest_angle_cosine(mesh, faces) > cos(radians(_THIN))]
+    thin = faces[smallest_angle_cosines(mesh.X[mesh.F[faces]][:, :, :3]) > cos(radians(_THIN))]
     return _components(plan, mesh, near_faces(mesh, centroids, centroids[thin], _BALL))
 
 
@@ -166,21 +167,12 @@ def _starts(rows: list[Any]) -> IntArray:
     )
 
 
-def _smallest_angle_cosine(mesh: SurfaceMesh, faces: IntArray) -> FloatArray:
-    """Cosine of the smallest angle of faces, which lies opposite the shortest side."""
-    corners = mesh.X[mesh.F[faces]][:, :, :3]
-    sides = np.sort(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2), axis=1)
-    a, b, c = sides.T
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.nan_to_num((b * b + c * c - a * a) / (2.0 * b * c), nan=1.0)
-
-
 ROUNDS = (
     Round("everything", SWEEP, _everything),
     Round("bands", SWEEP, _bands),
     Round("crossings", SWEEP, _crossings),
     Round("settling", MOVE, _settling),
-    Round("repairs", SWEEP, _repairs),
+    Round("repairs", REPAIR, _repairs),
 )
 
 

@@ -28,15 +28,16 @@ from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Plan
 from ..sweeps.rounds import run_rounds
 from ..sweeps.work import Work, is_large
+from .choice import better_regions
 from .index import Index, load_index
 from .piece import changed_faces, new_chords, read_piece, recognise, reset_lengths
 from .reference_piece import read_reference
 from .scratch import Arrays, load, save_task
 from .vocabulary import Parts, SurfaceMesh, load_mesh
 
-__all__ = ["LOCATE", "MOVE", "OVERLAP", "SWEEP", "Task", "run_task", "versions"]
+__all__ = ["LOCATE", "MOVE", "OVERLAP", "REPAIR", "SWEEP", "Task", "run_task", "versions"]
 
-SWEEP, MOVE, LOCATE = "sweep", "move", "locate"
+SWEEP, REPAIR, MOVE, LOCATE = "sweep", "repair", "move", "locate"
 
 # Moves of a task that changes no edges: where a border was frozen, they bring the areas back.
 _MOVES = Rounds(12)
@@ -62,7 +63,7 @@ class Task:
         Name of the folder in it with the parts, where the result goes.
     part : int
     kind : str
-        ``SWEEP``, ``MOVE`` or ``LOCATE``.
+        ``SWEEP``, ``REPAIR``, ``MOVE`` or ``LOCATE``.
     recipe : Recipe
     scale, gradation : float
         See `Plan`.
@@ -144,7 +145,11 @@ def _sweep(
     chords = new_chords(piece, changed, np.asarray(parts.shared))
     if len(chords):
         changed = recognise(piece, split_edges(result, make_blocks(result), chords, parallel))
-    return changed_faces(piece, changed)
+    faces = changed_faces(piece, changed)
+    if task.kind == REPAIR:
+        old = changed_faces(piece, recognise(piece, piece.mesh))
+        faces = better_regions(old, faces, whole.X)
+    return faces
 
 
 def _move(
@@ -213,4 +218,4 @@ def _fixed_points(index: Index, kind: NDArray[np.uint8], birth: NDArray[np.int32
     return {"fixed": rows, "fixed_points": np.array(index.fixed_points[place])}
 
 
-_KINDS = {SWEEP: _sweep, MOVE: _move, LOCATE: _locate}
+_KINDS = {SWEEP: _sweep, REPAIR: _sweep, MOVE: _move, LOCATE: _locate}
