@@ -77,6 +77,9 @@ def remesh_large(
     after a worker has died, and after a call that was interrupted and goes on. It depends on
     ``part_faces``. A surface that fits into one part is remeshed by `remesh`, with its result.
 
+    The input is prepared, and its features are found, in this process, which needs about as much memory
+    per face of the input as `remesh` does; the work after that needs memory for a part in each worker.
+
     Parameters
     ----------
     source : path, or (V, F)

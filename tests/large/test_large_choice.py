@@ -8,7 +8,7 @@ from remeshvec.large.geometry import smallest_angle_cosines
 # Two squares, each a region with the four corners as its rim (vertices 0 to 3, and 4 to 7).
 RIM = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
 X = np.zeros((8, 4))
-X[:4, :2], X[4:, :2] = RIM, RIM + [3.0, 0.0]
+X[:4, :2], X[4:, :2] = RIM, np.add(RIM, [3.0, 0.0])
 
 
 def fans(first, second):
