@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from .batch.one_file import remesh_file
     from .batch.one_item import remesh_item
     from .html_page.page import html_report, show_html, write_html
+    from .large.remesh_large import remesh_large
+    from .large.result import LargePart, LargeResult
     from .modelling.denoising import denoise
     from .modelling.editing import Editor, deform
     from .modelling.fairing import fair
@@ -52,6 +54,8 @@ __all__ = [
     "EditedSurface",
     "Editor",
     "LaplacianSolver",
+    "LargePart",
+    "LargeResult",
     "LightResult",
     "MeshFile",
     "MeshFormatError",
@@ -80,6 +84,7 @@ __all__ = [
     "remesh",
     "remesh_file",
     "remesh_item",
+    "remesh_large",
     "remesh_many",
     "repair",
     "show_html",
@@ -96,6 +101,8 @@ _LAZY = {
     "EditedSurface": "modelling.multiresolution",
     "Editor": "modelling.editing",
     "LaplacianSolver": "modelling.solver",
+    "LargePart": "large.result",
+    "LargeResult": "large.result",
     "MultiresolutionEditor": "modelling.multiresolution",
     "RepairReport": "scans.report",
     "RepairResult": "scans.report",
@@ -107,6 +114,7 @@ _LAZY = {
     "laplacian": "modelling.laplacians",
     "remesh_file": "batch.one_file",
     "remesh_item": "batch.one_item",
+    "remesh_large": "large.remesh_large",
     "remesh_many": "batch.many",
     "repair": "scans.repair",
     "show_html": "html_page",

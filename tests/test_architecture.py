@@ -24,7 +24,7 @@ FLOORS = [
     ["sweeps", "output"],
     ["pipeline"],
     ["modelling", "batch"],
-    ["evolver", "pyvista_accessor"],
+    ["evolver", "pyvista_accessor", "large"],
     ["__init__"],
     ["cli"],
     ["__main__"],

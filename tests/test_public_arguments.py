@@ -34,6 +34,7 @@ import remeshvec
 from remeshvec import (
     Adaptive,
     BatchError,
+    LargeResult,
     LightResult,
     MeshFormatError,
     RemeshResult,
@@ -49,6 +50,7 @@ MESH = (V, F)
 RECORDS = {
     "BatchItem",
     "Defects",
+    "LargePart",
     "MeshFile",
     "Quality",
     "RepairReport",
@@ -123,6 +125,10 @@ REMESH = {
 
 def result():
     return remesh(V, F, preset="fast", iterations=1)
+
+
+def large_result():
+    return remeshvec.remesh_large(MESH, out="out", preset="fast", iterations=1)
 
 
 TABLE = {
@@ -216,6 +222,29 @@ TABLE = {
         {"path": [*NOT_PATHS, "", "absent/a.npz", "a.obj"]},
         lambda: {"self": result().light(), "path": "a.npz"},
     ),
+    remeshvec.remesh_large: Entry(
+        {
+            "source": [None, 3, "", "absent.ply", (V,), (V, F, V), ("V.npy", "F.npy")],
+            "L": NOT_LENGTHS,
+            "out": [*NOT_PATHS, "absent/out", "out.obj", "in.obj"],
+            "scratch": [value for value in NOT_PATHS if value is not None],
+            "client": [3, "tcp://host:8786", object()],
+            "workers": NOT_COUNTS,
+            "part_faces": [*NOT_COUNTS, 9_999],
+            "resume": NOT_FLAGS,
+            "progress": NOT_FLAGS,
+        },
+        lambda: {"source": MESH, "out": "out", "workers": 1},
+    ),
+    LargeResult.parts: Entry({"faces": NOT_COUNTS}, lambda: {"self": large_result()}),
+    LargeResult.transfer: Entry(
+        {
+            "values": [*NOT_VALUES, "absent.npy"],
+            "out": [3, b"a", "a.txt", "absent/a.npy"],
+            "method": NOT_WORDS,
+        },
+        lambda: {"self": large_result(), "values": V},
+    ),
     RemeshResult.show: Entry(
         {"title": NOT_TEXTS, "up": NOT_WORDS}, lambda: {"self": result()}
     ),
@@ -280,8 +309,8 @@ def test_every_public_function_is_in_one_table(place):
         value = getattr(place, name)
         is_error = inspect.isclass(value) and issubclass(value, Exception)
         if callable(value) and not is_error and name not in records:
-            is_result = value in (RemeshResult, LightResult)  # which only the library makes
-            wanted = [] if is_result else [value]
+            made = (RemeshResult, LightResult, LargeResult)  # which only the library makes
+            wanted = [] if value in made else [value]
             wanted += public_methods(value) if inspect.isclass(value) else []
             for one in wanted:
                 assert sum(one in table for table in tables) == 1, one

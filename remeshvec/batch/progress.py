@@ -28,12 +28,13 @@ def bar(
     total: int | None,
     has_failed: Callable[[Item], bool],
     stream: TextIO | None = None,
+    noun: str = "meshes",
 ) -> Iterator[Item]:
-    """Yield the items, and show their number on a stream."""
+    """Yield the items, and show their number on a stream; ``noun`` says what they are."""
     stream = sys.stderr if stream is None else stream
     failed = 0
     try:
-        with _display(stream, total) as show:
+        with _display(stream, total, noun) as show:
             for done, item in enumerate(items, 1):
                 failed += has_failed(item)
                 show(done, failed)
@@ -46,22 +47,22 @@ def bar(
 
 
 @contextmanager
-def _display(stream: TextIO, total: int | None) -> Iterator[Display]:
-    progress = _rich_progress(stream, total) if stream.isatty() else None
+def _display(stream: TextIO, total: int | None, noun: str) -> Iterator[Display]:
+    progress = _rich_progress(stream, total, noun) if stream.isatty() else None
     if progress is not None:
         with progress:
             yield lambda done, failed: progress.update(
                 progress.task_ids[0], completed=done, failed=f"{failed:,} failed" if failed else ""
             )
         return
-    lines = Lines(stream, total)
+    lines = Lines(stream, total, noun)
     try:
         yield lines
     finally:
         lines.end()
 
 
-def _rich_progress(stream: TextIO, total: int | None) -> Any:
+def _rich_progress(stream: TextIO, total: int | None, noun: str) -> Any:
     """Return a bar, or None if the package rich is not installed."""
     try:
         from rich.console import Console
@@ -76,7 +77,7 @@ def _rich_progress(stream: TextIO, total: int | None) -> Any:
     except ImportError:
         return None
     progress = Progress(
-        TextColumn("meshes"),
+        TextColumn(noun),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
@@ -91,8 +92,8 @@ def _rich_progress(stream: TextIO, total: int | None) -> Any:
 class Lines:
     """Plain text: one line that is rewritten on a terminal, or one line per `SECONDS` in a log."""
 
-    def __init__(self, stream: TextIO, total: int | None) -> None:
-        self.stream, self.total = stream, total
+    def __init__(self, stream: TextIO, total: int | None, noun: str = "meshes") -> None:
+        self.stream, self.total, self.noun = stream, total, noun
         self.rewrites = stream.isatty()
         self.start = self.shown = perf_counter()
         self.last = (0, 0)
@@ -117,7 +118,8 @@ class Lines:
         self.told = self.last
         done, failed = self.last
         passed = perf_counter() - self.start
-        text = f"{done:,} of {self.total:,} meshes" if self.total else f"{done:,} meshes"
+        text = f"{done:,} of {self.total:,}" if self.total else f"{done:,}"
+        text += f" {self.noun}"
         text += f", {failed:,} failed" if failed else ""
         text += f", {passed:.0f} s"
         if self.total and done < self.total:

@@ -17,7 +17,15 @@ from ..measures.quality import quality
 from ..sizing.adaptive import Adaptive
 from .parser import OneLineParser
 
-__all__ = ["FILE_OPTIONS", "batch_parser", "given_options", "parse", "parser", "target_length"]
+__all__ = [
+    "FILE_OPTIONS",
+    "batch_parser",
+    "given_options",
+    "large_parser",
+    "parse",
+    "parser",
+    "target_length",
+]
 
 
 EPILOG = """\
@@ -47,6 +55,15 @@ Run the same command again to continue after an interrupt. It repeats meshes tha
 from another input or with other options.
 
 exit status: 0 all meshes are done, 3 some failed, 2 bad arguments, 130 interrupted
+"""
+
+LARGE_EPILOG = """\
+examples:
+  remeshvec large scan.ply -l 0.1 -o even.ply --workers 2
+  remeshvec large scan.ply -l 0.1 -o even.ply --scheduler tcp://host:8786 --scratch /shared/work
+
+Run the same command again to continue after an interrupt. Flags that have no meaning for a surface in
+parts are refused, with the reason.
 """
 
 # Options of `remesh` whose flags name files of numbers, and the number of columns of these files.
@@ -138,6 +155,50 @@ def batch_parser() -> argparse.ArgumentParser:
     result.add_argument("--version", action="version", version=f"remeshvec {__version__}")
     _add_size_options(result.add_argument_group("how long edges become"))
     _add_constraints(result.add_argument_group("what to keep"))
+    _add_remesh_options(result.add_argument_group("how to remesh"))
+    return result
+
+
+def large_parser() -> argparse.ArgumentParser:
+    """Return the parser of ``remeshvec large``."""
+    result = argparse.ArgumentParser(
+        prog="remeshvec large",
+        description="Remesh one large surface in parts, in several processes or on a cluster.",
+        epilog=LARGE_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = result.add_argument
+    add("input", metavar="INPUT", help="mesh file, or a folder with V.npy and F.npy")
+    add(
+        "-o",
+        "--out",
+        metavar="OUT",
+        required=True,
+        help="PLY or STL file to write, with a folder of arrays beside it; or that folder alone",
+    )
+    add("-l", "--length", type=_positive_number, metavar="L", help="target edge length")
+    add("--lengths", metavar="FILE", help="target edge length at every vertex")
+    add(
+        "--gradation",
+        type=_positive_number,
+        metavar="X",
+        help="largest ratio of the lengths at the ends of an edge (default 1.5)",
+    )
+    add("--scratch", metavar="DIR", help="folder for the work (default OUT.scratch)")
+    who = result.add_mutually_exclusive_group()
+    who.add_argument(
+        "--workers", type=_at_least_one, metavar="N", help="processes (default: all cores)"
+    )
+    who.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask scheduler, whose workers do the work"
+    )
+    add("--part-faces", type=_at_least_one, metavar="N", help="faces in a part (default 2000000)")
+    add("--restart", action="store_true", help="do not go on with a call that was interrupted")
+    add("--quiet", action="store_true", help="show errors only")
+    add("--version", action="version", version=f"remeshvec {__version__}")
+    keep = result.add_argument_group("what to keep")
+    _add_constraints(keep)
+    _add_files_of_constraints(keep)
     _add_remesh_options(result.add_argument_group("how to remesh"))
     return result
 

@@ -55,6 +55,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _ends(_batch_command.run, _batch_command.parsed(words[1:]))
     if words[:1] == ["completions"]:
         return _show_completions(words[1:])
+    if words[:1] == ["large"]:
+        from . import large_command as _large_command
+
+        return _ends(_large_command.run, _large_command.parsed(words[1:]))
     options = parse(parser(), words)
     options.call = shlex.join(["remeshvec", *words])
     return _ends(_run, options)

@@ -18,7 +18,9 @@ from typing import Any
 
 import numba
 
-__all__ = ["available_threads", "share", "thread_scope", "uninterrupted"]
+__all__ = ["available_threads", "numba_version", "share", "thread_scope", "uninterrupted"]
+
+numba_version: str = numba.__version__
 
 _PIECES = 16  # per thread: the others take the pieces of one that is held up
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 from itertools import cycle
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.vocabulary import FloatArray, IntArray
 from ..mesh.repair import weld_points
 from .polygon_mesh import PolygonMesh
 from .text import check_room, points, shown
 
-__all__ = ["parse_stl", "stl_bytes"]
+__all__ = ["FACET", "check_facets", "facets_of", "parse_stl", "stl_bytes"]
 
-_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _LINES = ((b"facet",), (b"outer", b"loop"), *[(b"vertex",)] * 3, (b"endloop",), (b"endfacet",))
 _LARGEST = np.finfo(np.float32).max
 
@@ -29,18 +30,28 @@ def parse_stl(data: bytes) -> PolygonMesh:
         It is neither ASCII nor binary STL, is cut short, or holds a number that is not finite.
     """
     corners = _facets(data)
-    if not np.isfinite(corners).all():
-        bad = int(np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))[0])
-        raise ValueError(f"facet {bad} (counted from 0) has a corner that is NaN or infinite")
+    check_facets(corners)
     V, F = _welded(corners.reshape(-1, 3))
     notice = f"{F.size:,} corners of triangles were welded to {len(V):,} vertices"
     return PolygonMesh(V, F, np.full(len(corners), 3), [notice])
 
 
+def check_facets(corners: NDArray[np.floating]) -> None:
+    """Refuse triangles (m, 3, 3) with a corner that is not finite.
+
+    Raises
+    ------
+    ValueError
+    """
+    if not np.isfinite(corners).all():
+        bad = int(np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))[0])
+        raise ValueError(f"facet {bad} (counted from 0) has a corner that is NaN or infinite")
+
+
 def _facets(data: bytes) -> FloatArray:
     """Return the corners of all triangles, (m, 3, 3)."""
     claimed = int.from_bytes(data[80:84], "little") if len(data) >= 84 else 0
-    size = _FACET.itemsize * claimed
+    size = FACET.itemsize * claimed
     fits = claimed > 0 and len(data) == 84 + size
     if not fits and data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
         return _ascii_facets(data)
@@ -48,7 +59,7 @@ def _facets(data: bytes) -> FloatArray:
         raise ValueError("it neither starts with 'solid' nor has the header of a binary STL")
     check_room(size, len(data) - 84, "bytes")
     with np.errstate(invalid="ignore"):  # some NaN warn when they are cast; they are refused later
-        return np.frombuffer(data, _FACET, claimed, 84)["corners"].astype(np.float64)
+        return np.frombuffer(data, FACET, claimed, 84)["corners"].astype(np.float64)
 
 
 def _ascii_facets(data: bytes) -> FloatArray:
@@ -77,12 +88,17 @@ def _welded(corners: FloatArray) -> tuple[FloatArray, IntArray]:
 
 def stl_bytes(V: FloatArray, F: IntArray) -> bytes:
     """Write a binary file, which holds float32, with unit normals, or zeros for faces without area."""
+    return b"remeshvec".ljust(80) + len(F).to_bytes(4, "little") + facets_of(V, F).tobytes()
+
+
+def facets_of(V: FloatArray, F: IntArray) -> NDArray[np.void]:
+    """Return the rows of a binary file."""
     if np.abs(V[F]).max() > _LARGEST:
         raise ValueError("a coordinate is too large for STL, which holds float32")
-    facets = np.zeros(len(F), _FACET)
+    facets = np.zeros(len(F), FACET)
     a, b, c = V[F[:, 0]], V[F[:, 1]], V[F[:, 2]]
     with np.errstate(all="ignore"):
         normal = np.cross(b - a, c - a)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     facets["normal"], facets["corners"] = np.nan_to_num(normal, posinf=0, neginf=0), V[F]
-    return b"remeshvec".ljust(80) + len(F).to_bytes(4, "little") + facets.tobytes()
+    return facets

@@ -30,7 +30,7 @@ from ..sweeps.monitor import Monitor
 from ..sweeps.work import is_large
 from .job import Job, Remeshed, Sizing, meet_count
 
-__all__ = ["read_sizing", "remesh_arrays"]
+__all__ = ["read_sizing", "remesh_arrays", "vertex_dtype"]
 
 
 def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResult:
@@ -58,7 +58,7 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
             _check_max_faces(done.count("faces"), sizing.max_faces, done.length)
         out = _extract(job, done, constraints, len(faces), np.asarray(F).dtype)
         with watch.time("extract"):
-            V2 = out.V.astype(_vertex_dtype(V), copy=False)
+            V2 = out.V.astype(vertex_dtype(V), copy=False)
     with watch.time("extract"):
         before = _kept(V, vertices), faces.astype(np.int32)
     report = Report(
@@ -163,7 +163,7 @@ def _kept(given: Any, checked: NDArray[Any]) -> NDArray[Any]:
     return checked.copy() if np.may_share_memory(np.asarray(given), checked) else checked
 
 
-def _vertex_dtype(V: ArrayLike) -> np.dtype[Any]:
+def vertex_dtype(V: ArrayLike) -> np.dtype[Any]:
     """Return the caller's dtype; coordinates that were whole numbers come back as float64."""
     dtype = np.asarray(V).dtype
     return dtype if dtype.kind == "f" else np.dtype(np.float64)

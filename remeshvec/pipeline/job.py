@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.vocabulary import EQUILATERAL_AREA, LARGEST_MESH, FloatArray, Mesh
@@ -18,23 +17,13 @@ from ..input.recipe import Recipe
 from ..reference.build import FeaturedReference, build_reference
 from ..sizing.adaptive import Adaptive
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
+from ..sweeps.care import Sweeper
 from ..sweeps.counts import count_elements
-from ..sweeps.deviation import DeviationCheck
-from ..sweeps.finish import deviation_of, finish, has_finish
-from ..sweeps.flaws import (
-    CrossingCheck,
-    FoldCheck,
-    TurnedCheck,
-    count_more_crossings,
-    count_new_flaws,
-    has_crossings_at_curves,
-)
-from ..sweeps.guard import Check, Guard, HoldingGuard
-from ..sweeps.loop import Stop, run_sweeps
-from ..sweeps.mending import mend_folds
+from ..sweeps.finish import deviation_of, has_finish
+from ..sweeps.loop import Stop
 from ..sweeps.monitor import Monitor
-from ..sweeps.plan import Adaptation, Count, Plan, make_schedule
-from ..sweeps.work import Work, is_large
+from ..sweeps.plan import Adaptation, Count, Plan
+from ..sweeps.work import is_large
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
 
@@ -85,17 +74,6 @@ class Remeshed:
     def count_held(self) -> int:
         """Count faces that had to stay."""
         return 0 if self.featured.held is None else int(self.featured.held.sum())
-
-
-@dataclass(frozen=True)
-class Swept:
-    """A mesh after the sweeps."""
-
-    work: Work
-    stop: Stop
-    counts: list[dict[str, int]]
-    n_flaws: int  # vertices at flaws that the mesh did not have before
-    n_crossings: int = 0  # vertices of faces that cross others and did not, where they were counted
 
 
 class Job:
@@ -161,9 +139,9 @@ class Job:
         """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
         monitor = self.monitor
         with monitor.watch.time("reference"):
-            featured, length = self._build_reference(meshes[0], L)
-        before = _shared_copy(meshes[0], featured)
-        swept = self._without_flaws(meshes, before, featured)
+            featured, length = self.build_reference(meshes[0], L)
+        sweeper = Sweeper(featured, self.plan, monitor, self.may_run_parallel, self.parallel)
+        swept = sweeper.sweep(meshes)
         work, stop, n_flaws = swept.work, swept.stop, swept.n_flaws
         is_compact = has_finish(work)
         deviation = deviation_of(work)
@@ -180,84 +158,7 @@ class Job:
             missed,
         )
 
-    def _without_flaws(
-        self, meshes: list[Mesh], before: Mesh, featured: FeaturedReference
-    ) -> Swept:
-        """Sweep over a mesh, with care where that makes flaws: most meshes are done after one look."""
-        best = self._swept(meshes, before, featured, ())
-        if not self.monitor.is_cancelled:
-            if best.n_flaws == 0 and has_crossings_at_curves(best.work.mesh, self.parallel):
-                best = self._judged(best, before)
-            if best.n_flaws or best.n_crossings:
-                best = self._with_care(best, before, featured)
-        self.monitor.counts = best.counts
-        return replace(best, stop=Stop.CANCELLED) if self.monitor.is_cancelled else best
-
-    def _with_care(self, best: Swept, before: Mesh, featured: FeaturedReference) -> Swept:
-        """Mend the flaws, or sweep again from before with a guard; returns the best of all.
-
-        A guard against crossings takes several times as long as one against folds alone, and holds
-        more than it must where an input crosses itself.
-        """
-        folds: tuple[Check, ...] = (FoldCheck(self.parallel),)
-        if self.recipe.project:
-            folds += (TurnedCheck(featured.reference.tree, self.parallel),)
-        crossings = CrossingCheck(self.parallel, self.recipe.avoid_intersections)
-        has_folds = best.n_flaws > 0
-        if has_folds and self._may_mend(best.work):
-            mend_folds(best.work, before, make_schedule(self.recipe)[-1])
-            best = self._judged(best, before)
-        guards = [folds, (*folds, crossings)]
-        for checks in guards[self.recipe.avoid_intersections or not has_folds :]:
-            if not (best.n_flaws or best.n_crossings) or self.monitor.is_cancelled:
-                break
-            other = self._judged(self._swept([before.copy()], before, featured, checks), before)
-            if not self.monitor.is_cancelled:
-                best = min(best, other, key=lambda swept: (swept.n_flaws, swept.n_crossings))
-        return best
-
-    def _judged(self, swept: Swept, before: Mesh) -> Swept:
-        """Count flaws, and faces that have come to cross others."""
-        after = swept.work.mesh
-        n_flaws = self._count_flaws(before, swept.work)
-        n_crossings = count_more_crossings(before, after, self.parallel)
-        return replace(swept, n_flaws=n_flaws, n_crossings=n_crossings)
-
-    def _may_mend(self, work: Work) -> bool:
-        """Tell whether edges may be changed after the last step: no bound or count says otherwise."""
-        plan = self.plan
-        bound = plan.max_deviation is not None or plan.adaptation is not None or plan.count
-        return not (bound or work.featured.on_non_manifold is not None or self.monitor.is_cancelled)
-
-    def _count_flaws(self, before: Mesh, work: Work) -> int:
-        """Count the flaws that sweeps have made."""
-        if self.monitor.is_cancelled:
-            return 0
-        tree = work.featured.reference.tree if self.recipe.project else None
-        crossings = self.recipe.avoid_intersections
-        return count_new_flaws(before, work.mesh, tree, crossings, self.parallel)
-
-    def _swept(
-        self,
-        meshes: list[Mesh],
-        before: Mesh,
-        featured: FeaturedReference,
-        checks: tuple[Check, ...],
-    ) -> Swept:
-        """Sweep over the mesh in a list and finish it, with a guard that makes these checks."""
-        self.monitor.counts = []
-        work = Work(meshes.pop(), featured, self.plan, self.monitor, self.may_run_parallel)
-        bound = self.plan.max_deviation
-        if bound is not None:
-            checks = (*checks, DeviationCheck(featured, bound, work.is_parallel))
-        guard = HoldingGuard(checks, work.is_parallel) if checks else Guard()
-        schedule = make_schedule(self.recipe, self.plan.adaptation is not None)
-        stop = run_sweeps(work, schedule, guard)
-        if has_finish(work):
-            finish(work, guard)
-        return Swept(work, stop, self.monitor.counts, self._count_flaws(before, work))
-
-    def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
+    def build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
         """Set the lengths of a mesh, mark its features, build the reference."""
         marks, length = self._set_lengths(mesh, L)
         featured = build_reference(
@@ -289,15 +190,6 @@ class Job:
             self.recipe.max_deviation,
         )
         return marks, length
-
-
-def _shared_copy(mesh: Mesh, featured: FeaturedReference) -> Mesh:
-    """Copy a mesh that sweeps will change, but for what the reference holds already: 28 bytes a face."""
-    reference = featured.reference
-    is_same = np.array_equal(reference.X[:, 3], mesh.X[:, 3])  # not where long rims raise lengths
-    X = reference.X if is_same else mesh.X.copy()
-    kept = mesh._replace(origin=reference.origin[:0], X=X[:0]).copy()
-    return kept._replace(origin=reference.origin, X=X)
 
 
 def _most_faces(allowed: int) -> int:

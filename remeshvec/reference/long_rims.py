@@ -36,7 +36,7 @@ class LongRims:
     def __init__(self, starts: FloatArray, ends: FloatArray, lengths: FloatArray) -> None:
         from scipy.spatial import cKDTree
 
-        self.lengths = lengths
+        self.starts, self.ends, self.lengths = starts, ends, lengths
         length = np.linalg.norm(ends - starts, axis=1)
         octave = np.floor(np.log(length / length.min()) / np.log(_OCTAVE))
         self.trees = []

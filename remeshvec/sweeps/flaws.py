@@ -65,10 +65,18 @@ class _Places:
 
 
 class FoldCheck:
-    """No folds and no faces without area that were not there."""
+    """No folds and no faces without area that were not there.
 
-    def __init__(self, parallel: bool) -> None:
+    Parameters
+    ----------
+    parallel : bool
+    tolerated : (k, 3) float64, optional
+        Places at which there may be flaws as if there had been some before, however many.
+    """
+
+    def __init__(self, parallel: bool, tolerated: FloatArray | None = None) -> None:
         self.parallel = parallel
+        self.tolerated = tolerated
 
     def remember(self, mesh: Mesh, tree: LazyTree) -> None:
         """Note where the mesh is folded, and where faces have no area."""
@@ -81,9 +89,14 @@ class FoldCheck:
         edge = np.repeat(np.arange(len(h)), steps)
         place = np.arange(len(edge)) - np.repeat(np.cumsum(steps) - steps, steps)
         share = ((place + 0.5) / steps[edge])[:, None]
-        self.folds = _Places(a[edge] + share * (b - a)[edge], float(length.sum()))
+        self.folds = self._places(a[edge] + share * (b - a)[edge], float(length.sum()))
         flat = find_flat_faces(mesh, vectors)
-        self.flat = _Places(_middles(mesh, flat), float(len(flat)))
+        self.flat = self._places(_middles(mesh, flat), float(len(flat)))
+
+    def _places(self, points: FloatArray, amount: float) -> _Places:
+        if self.tolerated is None:
+            return _Places(points, amount)
+        return _Places(np.concatenate([points, self.tolerated]), np.inf)
 
     def offenders(self, mesh: Mesh, tree: LazyTree) -> Offenders:
         """Corners of the faces at new folded edges, and of new faces without area."""
@@ -166,9 +179,16 @@ class CrossingCheck:
 
 
 def count_new_flaws(
-    before: Mesh, after: Mesh, input_tree: Tree | None, crossings: bool, parallel: bool
+    before: Mesh,
+    after: Mesh,
+    input_tree: Tree | None,
+    crossings: bool,
+    parallel: bool,
+    tolerated: FloatArray | None = None,
 ) -> int:
     """Count the vertices at flaws that a mesh has and an earlier one, the input, has not.
+
+    Those tolerated do not count.
 
     Faces turned over count where the tree over the input is given, crossings only if asked for: to look
     for them takes longer.
@@ -177,7 +197,7 @@ def count_new_flaws(
     if input_tree is not None:
         count += len(_corners(after, _turned(after, input_tree, parallel)).vertices)
     if has_folds(after, make_blocks(after), parallel):
-        check = FoldCheck(parallel)
+        check = FoldCheck(parallel, tolerated)
         check.remember(before, lazy_tree(before, parallel))
         count += check.offenders(after, lazy_tree(after, parallel)).size
     return count + (_new_crossings(before, after, True, parallel)[0] if crossings else 0)

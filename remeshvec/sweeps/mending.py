@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.vocabulary import IndexArray, Mesh
+from ..core.vocabulary import FloatArray, IndexArray, Mesh
 from ..mesh.edge_curves import is_locked
 from ..mesh.walk import ends_of
 from ..operations.split import split_edges
@@ -35,7 +35,7 @@ _SHORTER = 0.7
 _RINGS = 2 * _SHORTER_RINGS
 
 
-def mend_folds(work: Work, before: Mesh, sweep: Sweep) -> None:
+def mend_folds(work: Work, before: Mesh, sweep: Sweep, tolerated: FloatArray | None = None) -> None:
     """Sweep around new folds, and new faces without area or turned over; keep what lessens them.
 
     Parameters
@@ -46,8 +46,10 @@ def mend_folds(work: Work, before: Mesh, sweep: Sweep) -> None:
         Its flaws are not new.
     sweep : Sweep
         What a round does.
+    tolerated : (k, 3) float64, optional
+        See `FoldCheck`.
     """
-    folds = FoldCheck(work.is_parallel)
+    folds = FoldCheck(work.is_parallel, tolerated)
     folds.remember(before, lazy_tree(before, work.is_parallel))
     checks: list[Check] = [folds]
     if work.plan.recipe.project:

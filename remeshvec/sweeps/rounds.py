@@ -65,10 +65,12 @@ def even_out(work: Work, guard: Guard) -> None:
                 run_rounds(trial, rounds)
 
 
-def run_rounds(work: Work, rounds: Rounds) -> None:
+def run_rounds(work: Work, rounds: Rounds, flips: bool = True) -> None:
     """Move vertices towards the centroids of their cells; flip and project from time to time.
 
     With patience, they end where the areas have settled, which is looked for at every projection.
+    Without flips, a vertex depends on no others than those within as many rings as there are rounds,
+    and three more.
     """
     mesh, blocks, parallel = work.mesh, work.blocks, work.is_parallel
     pace = Pace(rounds.gain, rounds.momentum, _REACH)
@@ -82,7 +84,7 @@ def run_rounds(work: Work, rounds: Rounds) -> None:
         measure_frames(mesh, blocks, rounds.stiffness, frames, parallel)
         turn_velocities(mesh, blocks, frames, velocity, parallel)
         for n in range(first, min(first + _PROJECT_EVERY, rounds.number)):
-            if n % _FLIP_EVERY == 0:
+            if flips and n % _FLIP_EVERY == 0:
                 _flip(work, rounds)
             slide_vertices(mesh, blocks, work.featured.reference, parallel)
             run_lloyd_round(mesh, blocks, frames, velocity, pace, work.varies, parallel)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from remeshvec import OptionError, remesh
-from remeshvec.cli.arguments import batch_parser, parser
+from remeshvec.cli.arguments import batch_parser, large_parser, parser
 from remeshvec.core.threads import available_threads
 from remeshvec.input.options import RemeshKeywords, RemeshOptions
 from remeshvec.input.recipe import PRESETS, make_recipe
@@ -93,9 +93,13 @@ def test_keywords_flags_and_documentation_are_those_of_the_record():
 # Options that name elements of one mesh come from files; functions have no flag.
 FILES = {"feature_edges", "fixed_vertices", "fixed_faces", "face_labels", "selection"}
 NO_FLAG = {"callback", "max_faces", "preserve", "untangle_angle"}
+IN_PARTS = {"n_faces", "n_vertices", "max_deviation"}  # have no meaning there
 
 
-@pytest.mark.parametrize(("flags", "absent"), [(parser, NO_FLAG), (batch_parser, NO_FLAG | FILES)])
+@pytest.mark.parametrize(
+    ("flags", "absent"),
+    [(parser, NO_FLAG), (batch_parser, NO_FLAG | FILES), (large_parser, NO_FLAG | IN_PARTS)],
+)
 def test_every_option_has_a_flag(flags, absent):
     names = {action.dest.removeprefix("no_"): action for action in flags()._actions}
     record = {field.name: field for field in dataclasses.fields(RemeshOptions)}

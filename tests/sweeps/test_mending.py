@@ -5,7 +5,7 @@ import pytest
 from helpers import zoo
 from helpers.structure import built
 
-import remeshvec.pipeline.job as job
+import remeshvec.sweeps.care as care
 from remeshvec import remesh
 from remeshvec.core.vocabulary import HALTED, HELD, NONE, PINNED
 from remeshvec.sweeps.holding import hold, let_go, rings_around
@@ -23,9 +23,11 @@ def lens(thickness, seed):
 def guards(monkeypatch):
     """The checks of all guards that were asked for."""
     asked = []
-    make = job.HoldingGuard
+    make = care.HoldingGuard
     monkeypatch.setattr(
-        job, "HoldingGuard", lambda checks, parallel: asked.append(checks) or make(checks, parallel)
+        care,
+        "HoldingGuard",
+        lambda checks, parallel: asked.append(checks) or make(checks, parallel),
     )
     return asked
 
@@ -39,7 +41,7 @@ def test_a_few_folds_are_mended_without_a_guard(thickness, seed, L, preset, guar
     result = remesh(V, F, L, preset=preset)
     assert not guards
     assert not len(result.report.defects.folds)
-    monkeypatch.setattr(job.Job, "_may_mend", lambda *_: False)
+    monkeypatch.setattr(care.Sweeper, "_may_mend", lambda *_: False)
     remesh(V, F, L, preset=preset)
     assert guards
 
@@ -48,7 +50,7 @@ def test_mending_is_local(monkeypatch):
     thickness, seed, L, _ = MENDED[0]
     V, F = lens(thickness, seed)
     mended = remesh(V, F, L)
-    monkeypatch.setattr(job.Job, "_with_care", lambda self, best, *_: best)
+    monkeypatch.setattr(care.Sweeper, "_with_care", lambda self, best, *_: best)
     plain = remesh(V, F, L)
     assert len(plain.report.defects.folds)
     old, new = ({tuple(v) for v in r.V.tolist()} for r in (plain, mended))
