@@ -151,6 +151,8 @@ class Sweeper:
 def _shared_copy(mesh: Mesh, featured: FeaturedReference) -> Mesh:
     """Copy a mesh that sweeps will change, but for what the reference holds already: 28 bytes a face."""
     reference = featured.reference
+    if not np.array_equal(reference.origin, mesh.origin):  # a part, beside a larger reference
+        return mesh.copy()
     is_same = np.array_equal(reference.X[:, 3], mesh.X[:, 3])  # not where long rims raise lengths
     X = reference.X if is_same else mesh.X.copy()
     kept = mesh._replace(origin=reference.origin[:0], X=X[:0]).copy()
