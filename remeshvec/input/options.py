@@ -51,6 +51,7 @@ class RemeshOptions:
     n_vertices: int | None = None
     gradation: float = 1.5
     max_deviation: float | None = None
+    clearance: float | None = 0.4
     # What to keep.
     feature_angle: FeatureAngle = "auto"
     corner_angle: float | None = None
@@ -86,6 +87,7 @@ class RemeshKeywords(TypedDict, total=False):
     n_vertices: int | None
     gradation: float
     max_deviation: float | None
+    clearance: float | None
     feature_angle: FeatureAngle
     corner_angle: float | None
     feature_edges: ArrayLike | None

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import sqrt
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.vocabulary import EQUILATERAL_AREA, LARGEST_MESH, FloatArray, Mesh
@@ -15,7 +16,8 @@ from ..input.constraints import ConstraintMasks, Constraints
 from ..input.prepare import Prepared
 from ..input.recipe import Recipe
 from ..reference.build import FeaturedReference, build_reference
-from ..sizing.adaptive import Adaptive
+from ..reference.clearance import find_gaps
+from ..sizing.adaptive import Adaptive, expected_faces
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
 from ..sweeps.counts import count_elements
 from ..sweeps.deviation import DeviationCheck
@@ -25,7 +27,7 @@ from ..sweeps.flaws import (
     FoldCheck,
     count_more_crossings,
     count_new_flaws,
-    has_crossings_at_curves,
+    has_crossings_where_thin,
 )
 from ..sweeps.guard import Check, Guard, HoldingGuard
 from ..sweeps.loop import Stop, run_sweeps
@@ -33,6 +35,7 @@ from ..sweeps.mending import mend_folds
 from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Adaptation, Count, Plan, make_schedule
 from ..sweeps.work import Work, is_large
+from .clearing import Start, clear
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
 
@@ -49,6 +52,9 @@ _WAYS = {"to_input": "from the result to the input", "from_input": "from the inp
 _ON_THE_WAY = 32
 _LENT = 10_000_000
 _ON_THE_WAY_LARGE = 1.25
+
+# Shorter edges are worth their faces if no more than this share of the flaws is left.
+_WORTH = 0.5
 
 Lengths = float | ArrayLike | Callable[[FloatArray], ArrayLike] | Adaptive
 
@@ -75,6 +81,7 @@ class Remeshed:
     stop: str  # why the sweeps ended, in words
     deviation: dict[str, float]  # from the input, in its units
     missed: str = ""  # which bound does not hold, in words
+    clearance: dict[str, float] = field(default_factory=dict)  # see `Report`
 
     def count(self, noun: str) -> int:
         """Count faces or vertices."""
@@ -89,11 +96,17 @@ class Remeshed:
 class Swept:
     """A mesh after the sweeps."""
 
+    start: Start
     work: Work
     stop: Stop
     counts: list[dict[str, int]]
     n_flaws: int  # vertices at flaws that the mesh did not have before
     n_crossings: int = 0  # vertices of faces that cross others and did not, where they were counted
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether nothing wrong is known."""
+        return not (self.n_flaws or self.n_crossings)
 
 
 class Job:
@@ -159,9 +172,10 @@ class Job:
         """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
         monitor = self.monitor
         with monitor.watch.time("reference"):
-            featured, length = self._build_reference(meshes[0], L)
-        before = meshes[0].copy()
-        swept = self._without_flaws(meshes.pop(), before, featured)
+            marks, length = self._set_lengths(meshes[0], L)
+            featured = self._build_reference(meshes[0], marks)
+        start = Start(meshes[0].copy(), featured, marks)
+        swept = self._without_flaws(meshes.pop(), start)
         work, stop, n_flaws = swept.work, swept.stop, swept.n_flaws
         is_compact = has_finish(work)
         deviation = deviation_of(work)
@@ -170,49 +184,86 @@ class Job:
             work.mesh,
             is_compact,
             not (work.was_guarded or self.recipe.fit_rounds),
-            featured,
+            work.featured,
             length / self.prepared.scale,
             monitor.counts,
             "; ".join(filter(None, (_in_words(stop, self.recipe.tol, n_flaws), missed))),
             deviation,
             missed,
+            swept.start.clearance or {},
         )
 
-    def _without_flaws(self, mesh: Mesh, before: Mesh, featured: FeaturedReference) -> Swept:
+    def _without_flaws(self, mesh: Mesh, start: Start) -> Swept:
         """Sweep over a mesh, with care where that makes flaws: most meshes are done after one look."""
-        best = self._swept(mesh, before, featured, ())
+        best = self._swept(mesh, start, ())
         if not self.monitor.is_cancelled:
-            if best.n_flaws == 0 and has_crossings_at_curves(best.work.mesh, self.parallel):
-                best = self._judged(best, before)
-            if best.n_flaws or best.n_crossings:
-                best = self._with_care(best, before, featured)
+            gap = self._gaps(start)
+            is_thin = None if gap is None else np.isfinite(gap)
+            if best.is_clean and has_crossings_where_thin(best.work.mesh, is_thin, self.parallel):
+                best = self._judged(best)
+            if not best.is_clean:
+                best = self._with_care(best, gap)
         self.monitor.counts = best.counts
         return replace(best, stop=Stop.CANCELLED) if self.monitor.is_cancelled else best
 
-    def _with_care(self, best: Swept, before: Mesh, featured: FeaturedReference) -> Swept:
-        """Mend the flaws, or sweep again from before with a guard; returns the best of all.
+    def _with_care(self, best: Swept, gap: FloatArray | None) -> Swept:
+        """Mend the flaws, or sweep again from before; returns the best of all.
 
-        A guard against crossings takes several times as long as one against folds alone, and holds
-        more than it must where an input crosses itself.
+        With shorter edges where sheets are near, and then with a guard. A guard against crossings takes
+        several times as long as one against folds alone, and holds more than it must where an input
+        crosses itself.
         """
-        folds = FoldCheck(self.parallel)
-        crossings = CrossingCheck(self.parallel, self.recipe.avoid_intersections)
         has_folds = best.n_flaws > 0
         if has_folds and self._may_mend(best.work):
-            mend_folds(best.work, before, make_schedule(self.recipe)[-1])
-            best = self._judged(best, before)
+            mend_folds(best.work, best.start.mesh, make_schedule(self.recipe)[-1])
+            best = self._judged(best)
+        if gap is not None and not best.is_clean and not self.monitor.is_cancelled:
+            best = self._with_clearance(best, gap)
+            has_folds &= best.n_flaws > 0 or not best.start.clearance
+        folds = FoldCheck(self.parallel)
+        crossings = CrossingCheck(self.parallel, self.recipe.avoid_intersections)
         guards: list[tuple[Check, ...]] = [(folds,), (folds, crossings)]
         for checks in guards[self.recipe.avoid_intersections or not has_folds :]:
-            if not (best.n_flaws or best.n_crossings) or self.monitor.is_cancelled:
+            if best.is_clean or self.monitor.is_cancelled:
                 break
-            other = self._judged(self._swept(before.copy(), before, featured, checks), before)
+            other = self._judged(self._swept(best.start.mesh.copy(), best.start, checks))
             if not self.monitor.is_cancelled:
                 best = min(best, other, key=lambda swept: (swept.n_flaws, swept.n_crossings))
         return best
 
-    def _judged(self, swept: Swept, before: Mesh) -> Swept:
+    def _gaps(self, start: Start) -> FloatArray | None:
+        """Distances to the next sheet on either side of every face of the input; None if not asked for.
+
+        A number of faces or vertices to be met is a stronger wish than lengths.
+        """
+        if self.recipe.clearance is None or self.plan.count:
+            return None
+        with self.monitor.watch.time("clearance"):
+            return find_gaps(start.featured.reference.tree, start.mesh, self.parallel)
+
+    def _with_clearance(self, best: Swept, gap: FloatArray) -> Swept:
+        """Sweep again with shorter edges where sheets are near, if that is worth its faces."""
+        with self.monitor.watch.time("clearance"):
+            share = self.recipe.clearance or 0.0
+            start = clear(best.start, gap, share, self._limited, self._build_reference)
+        if (
+            start is None
+            or expected_faces(start.mesh.X, start.mesh.origin, start.mesh.X[:, 3].copy())
+            > self.plan.max_faces
+        ):
+            return best
+        try:
+            other = self._judged(self._swept(start.mesh.copy(), start, ()))
+        except OptionError:  # more faces than allowed, on the way
+            return best
+        left, before = (swept.n_flaws + swept.n_crossings for swept in (other, best))
+        is_worth_it = count_elements(other.work.mesh, "faces") <= self.plan.max_faces
+        is_worth_it &= left <= _WORTH * before and not self.monitor.is_cancelled
+        return other if is_worth_it else best
+
+    def _judged(self, swept: Swept) -> Swept:
         """Count flaws, and faces that have come to cross others."""
-        after = swept.work.mesh
+        before, after = swept.start.mesh, swept.work.mesh
         n_flaws = self._count_flaws(before, after)
         n_crossings = count_more_crossings(before, after, self.parallel)
         return replace(swept, n_flaws=n_flaws, n_crossings=n_crossings)
@@ -229,26 +280,28 @@ class Job:
             return 0
         return count_new_flaws(before, after, self.recipe.avoid_intersections, self.parallel)
 
-    def _swept(
-        self, mesh: Mesh, before: Mesh, featured: FeaturedReference, checks: tuple[Check, ...]
-    ) -> Swept:
+    def _swept(self, mesh: Mesh, start: Start, checks: tuple[Check, ...]) -> Swept:
         """Sweep over a mesh and finish it, with a guard that makes these checks."""
         self.monitor.counts = []
-        work = Work(mesh, featured, self.plan, self.monitor, self.may_run_parallel)
+        work = Work(mesh, start.featured, self.plan, self.monitor, self.may_run_parallel)
         bound = self.plan.max_deviation
         if bound is not None:
-            checks = (*checks, DeviationCheck(featured, bound, work.is_parallel))
+            checks = (*checks, DeviationCheck(start.featured, bound, work.is_parallel))
         guard = HoldingGuard(checks, work.is_parallel) if checks else Guard()
         schedule = make_schedule(self.recipe, self.plan.adaptation is not None)
         stop = run_sweeps(work, schedule, guard)
         if has_finish(work):
             finish(work, guard)
-        return Swept(work, stop, self.monitor.counts, self._count_flaws(before, work.mesh))
+        n_flaws = self._count_flaws(start.mesh, work.mesh)
+        return Swept(start, work, stop, self.monitor.counts, n_flaws)
 
-    def _build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
-        """Set the lengths of a mesh, mark its features, build the reference."""
-        marks, length = self._set_lengths(mesh, L)
-        featured = build_reference(
+    def _limited(self, mesh: Mesh, lengths: FloatArray) -> FloatArray:
+        """Bound the growth of lengths over a mesh."""
+        return limited_lengths(self.prepared._replace(mesh=mesh), lengths, self.sizing.gradation)
+
+    def _build_reference(self, mesh: Mesh, marks: ConstraintMasks) -> FeaturedReference:
+        """Mark the features of a mesh that has its lengths, build the reference."""
+        return build_reference(
             mesh,
             self.prepared.vertex_source,
             self.constraints.feature_angle,
@@ -257,7 +310,6 @@ class Job:
             self.parallel,
             self.constraints.corner_angle,
         )
-        return featured, length
 
     def _set_lengths(self, mesh: Mesh, L: Lengths | None) -> tuple[ConstraintMasks, float]:
         """Set the lengths of a mesh; returns what must stay, and the length of the mean new edge."""

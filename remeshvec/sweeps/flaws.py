@@ -18,7 +18,7 @@ __all__ = [
     "FoldCheck",
     "count_more_crossings",
     "count_new_flaws",
-    "has_crossings_at_curves",
+    "has_crossings_where_thin",
 ]
 
 # New flaws within so many target lengths of old ones are the old ones, moved; ...
@@ -144,18 +144,20 @@ def count_new_flaws(before: Mesh, after: Mesh, crossings: bool, parallel: bool) 
     return count + (_new_crossings(before, after, True, parallel)[0] if crossings else 0)
 
 
-def has_crossings_at_curves(mesh: Mesh, parallel: bool) -> bool:
-    """Tell whether faces at curves cross others that they share no corner with.
+def has_crossings_where_thin(mesh: Mesh, is_thin: BoolArray | None, parallel: bool) -> bool:
+    """Tell whether faces at curves, or born on thin faces, cross others that they share no corner with.
 
     Chords of curves leave the surface farthest: where walls are thin, faces cross there first. To ask
-    about all faces takes a third of a call.
+    about all faces takes a third of a call. ``is_thin`` are (m,) faces of the reference.
     """
     F = mesh.origin.reshape(-1, 3)
     F = F[F[:, 0] != DEAD]
-    at_curve = (mesh.kind >= CURVE)[F].any(axis=1)
-    if not at_curve.any():
+    is_asked = mesh.kind[F] >= CURVE
+    if is_thin is not None:
+        is_asked |= is_thin[mesh.birth[F] // 3]
+    if not is_asked.any():
         return False
-    return len(crossing_faces(tree_of(mesh, parallel), parallel, False, at_curve)) > 0
+    return len(crossing_faces(tree_of(mesh, parallel), parallel, False, is_asked.any(axis=1))) > 0
 
 
 def count_more_crossings(before: Mesh, after: Mesh, parallel: bool) -> int:
