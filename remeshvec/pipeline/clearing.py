@@ -8,16 +8,18 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.vocabulary import BoolArray, FloatArray, Mesh
+from ..features.dihedral import find_dihedral_angles
 from ..input.constraints import ConstraintMasks
 from ..reference.build import FeaturedReference
 from ..reference.clearance import clearance_lengths
 
 __all__ = ["Start", "clear"]
 
-# Where sheets are near, lengths fall to this share of what was asked for at most (64 times the faces);
-# creases are sought down to a smaller one.
-_LEAST_LENGTH = 1.0 / 8.0
-_LEAST_SCALE = 1.0 / 64.0
+# Where sheets are near, lengths fall to this share of what was asked for at most: 16 times the faces.
+_LEAST_LENGTH = 1.0 / 4.0
+
+# Degrees from which edges are creases there, whatever stands out at the scale of the lengths.
+_SHARP = 40.0
 
 
 class Start(NamedTuple):
@@ -33,13 +35,14 @@ def clear(
     start: Start,
     gap: FloatArray,
     share: float,
+    finds_creases: bool,
     limit: Callable[[Mesh, FloatArray], FloatArray],
     build: Callable[[Mesh, ConstraintMasks], FeaturedReference],
 ) -> Start | None:
-    """Shorten lengths where sheets are near; None where they need not be.
+    """Shorten lengths where sheets are near; None where nothing changes.
 
-    Creases are sought again at the scale that the place needs: those of a rod thinner than the lengths
-    do not stand out at their scale. Between them the rod may be flat, and needs no shorter edges.
+    On a rod thinner than the lengths no edge stands out at their scale. So edges that turn sharply there
+    become creases; between them the rod may be flat, and then needs no shorter edges.
 
     Parameters
     ----------
@@ -49,33 +52,44 @@ def clear(
         See `find_gaps`.
     share : float
         Of the gap, that chords may take.
+    finds_creases : bool
+        Whether edges may become creases.
     limit : callable
         Bounds the growth of lengths over a mesh.
     build : callable
         Marks the features of a mesh that has its lengths, and builds the reference.
     """
     asked = start.featured.reference.X[:, 3]
-    mesh, featured, marks = start.mesh.copy(), start.featured, start.marks
-    for least in (_LEAST_SCALE, _LEAST_LENGTH):
-        longest = clearance_lengths(mesh, _is_feature(featured), gap, share)
-        lengths = np.minimum(asked, np.maximum(longest, least * asked))
-        mesh.X[:, 3] = limit(mesh, lengths)
-        featured = build(mesh, marks)
-        marks = marks._replace(hard=marks.hard | _is_feature(featured))
+    mesh = start.mesh.copy()
+    is_feature = np.zeros(len(mesh.origin), np.bool_)
+    is_feature[start.featured.features] = True
+    n_creases = int(is_feature.sum())
+    if finds_creases:
+        is_feature |= _sharp_edges(start, gap)
+    bound = clearance_lengths(mesh, is_feature, gap, share)
+    lengths = np.minimum(asked, np.maximum(bound, _LEAST_LENGTH * asked))
     is_shorter = lengths < asked
-    n_new = len(featured.names) - len(start.featured.names)
-    if not is_shorter.any() and n_new <= 0:
+    n_new = int(is_feature.sum()) - n_creases
+    if not (is_shorter.any() or n_new):
         return None
+    mesh.X[:, 3] = limit(mesh, lengths)
+    marks = start.marks._replace(hard=start.marks.hard | is_feature)
+    featured = build(mesh, marks)
     clearance = {
         "vertices": int(is_shorter.sum()),
         "shortest": float((lengths / asked).min()),
-        "new_crease_edges": n_new,
+        "new_crease_edges": n_new // 2,
     }
     return Start(mesh, featured, marks, clearance)
 
 
-def _is_feature(featured: FeaturedReference) -> BoolArray:
-    """Tell which half-edges of the reference are on features."""
-    is_feature = np.zeros(len(featured.reference.origin), np.bool_)
-    is_feature[featured.features] = True
-    return is_feature
+def _sharp_edges(start: Start, gap: FloatArray) -> BoolArray:
+    """Tell which half-edges turn sharply beside a face with a sheet near."""
+    X, origin, twin = start.mesh.X, start.mesh.origin, start.mesh.twin
+    edges = find_dihedral_angles(X, origin, twin, _SHARP, parallel=False).edges
+    is_near = np.isfinite(gap)
+    edges = edges[is_near[edges // 3] | is_near[twin[edges] // 3]]
+    is_sharp = np.zeros(len(origin), np.bool_)
+    is_sharp[edges] = True
+    is_sharp[twin[edges]] = True
+    return is_sharp

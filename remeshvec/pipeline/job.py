@@ -245,7 +245,9 @@ class Job:
         """Sweep again with shorter edges where sheets are near, if that is worth its faces."""
         with self.monitor.watch.time("clearance"):
             share = self.recipe.clearance or 0.0
-            start = clear(best.start, gap, share, self._limited, self._build_reference)
+            finds_creases = self.constraints.feature_angle == "auto"
+            build = self._build_reference
+            start = clear(best.start, gap, share, finds_creases, self._limited, build)
         if (
             start is None
             or expected_faces(start.mesh.X, start.mesh.origin, start.mesh.X[:, 3].copy())
