@@ -11,6 +11,7 @@ from typing import Any, Literal, TypedDict
 from numpy.typing import ArrayLike
 
 __all__ = [
+    "CLEARANCE",
     "MAX_FACES",
     "OPTION_NAMES",
     "Boundary",
@@ -23,6 +24,7 @@ __all__ = [
 ]
 
 MAX_FACES = 50_000_000
+CLEARANCE = 0.4
 
 Preset = Literal["default", "even", "fast", "fine"]
 Boundary = Literal["free", "split", "fixed"]
@@ -51,7 +53,7 @@ class RemeshOptions:
     n_vertices: int | None = None
     gradation: float = 1.5
     max_deviation: float | None = None
-    clearance: float | None = 0.4
+    clearance: float | None = CLEARANCE
     # What to keep.
     feature_angle: FeatureAngle = "auto"
     corner_angle: float | None = None

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.arguments import choice, count, flag, number
 from ..core.threads import available_threads
 from ..errors import OptionError
-from .options import RemeshOptions
+from .options import CLEARANCE, RemeshOptions
 
 __all__ = ["PRESETS", "Recipe", "make_recipe"]
 
@@ -58,7 +58,7 @@ class Recipe:
     fit_rounds: int = 0
     tol: float | None = None  # stop where a sweep changes less
     max_deviation: float | None = None  # distance from the input, in its units
-    clearance: float | None = 0.4  # share of the gap to the next sheet that chords may take
+    clearance: float | None = CLEARANCE  # share of the gap to the next sheet that chords may take
     avoid_intersections: bool = False  # no face may cross another that did not
     threads: int = 1
 

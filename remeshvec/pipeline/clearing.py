@@ -13,7 +13,7 @@ from ..input.constraints import ConstraintMasks
 from ..reference.build import FeaturedReference
 from ..reference.clearance import clearance_lengths
 
-__all__ = ["Start", "clear"]
+__all__ = ["Start", "clear", "clearance_in_words"]
 
 # Where sheets are near, lengths fall to this share of what was asked for at most: 16 times the faces.
 _LEAST_LENGTH = 1.0 / 4.0
@@ -81,6 +81,19 @@ def clear(
         "new_crease_edges": n_new // 2,
     }
     return Start(mesh, featured, marks, clearance)
+
+
+def clearance_in_words(clearance: dict[str, float]) -> str:
+    """Say what was done where sheets are near."""
+    words = []
+    if clearance["vertices"]:
+        words.append(
+            f"lengths fall to {clearance['shortest']:.2g} of what was asked for, at "
+            f"{clearance['vertices']:,} vertices of the input"
+        )
+    if clearance["new_crease_edges"]:
+        words.append(f"{clearance['new_crease_edges']:,} more edges are creases")
+    return f"where sheets are near (clearance), {' and '.join(words)}"
 
 
 def _sharp_edges(start: Start, gap: FloatArray) -> BoolArray:

@@ -35,7 +35,7 @@ from ..sweeps.mending import mend_folds
 from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Adaptation, Count, Plan, make_schedule
 from ..sweeps.work import Work, is_large
-from .clearing import Start, clear
+from .clearing import Start, clear, clearance_in_words
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
 
@@ -176,7 +176,7 @@ class Job:
             featured = self._build_reference(meshes[0], marks)
         start = Start(meshes[0].copy(), featured, marks)
         swept = self._without_flaws(meshes.pop(), start)
-        work, stop, n_flaws = swept.work, swept.stop, swept.n_flaws
+        work, stop = swept.work, swept.stop
         is_compact = has_finish(work)
         deviation = deviation_of(work)
         missed = _missed(deviation, self.recipe.max_deviation, self.sizing.L)
@@ -187,7 +187,7 @@ class Job:
             work.featured,
             length / self.prepared.scale,
             monitor.counts,
-            "; ".join(filter(None, (_in_words(stop, self.recipe.tol, n_flaws), missed))),
+            "; ".join(filter(None, (_in_words(stop, self.recipe.tol, swept), missed))),
             deviation,
             missed,
             swept.start.clearance or {},
@@ -350,15 +350,17 @@ def _adaptation(prepared: Prepared, sizing: Sizing) -> Adaptation | None:
     )
 
 
-def _in_words(stop: Stop, tol: float | None, n_flaws: int) -> str:
+def _in_words(stop: Stop, tol: float | None, swept: Swept) -> str:
     words = str(stop.value)
     if stop is Stop.CONVERGED:
         words += (
             f" (tol): the last sweep changed less than {tol:g} of the edges and moved "
             f"vertices by less than {tol:g} L"
         )
-    if n_flaws:
-        words += f"; new flaws at {n_flaws} vertices, see report.defects"
+    if swept.start.clearance:
+        words += f"; {clearance_in_words(swept.start.clearance)}"
+    if swept.n_flaws:
+        words += f"; new flaws at {swept.n_flaws} vertices, see report.defects"
     return words
 
 
