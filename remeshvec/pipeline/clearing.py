@@ -28,12 +28,12 @@ class Start(NamedTuple):
     mesh: Mesh  # with its lengths and features; sweeps work on copies
     featured: FeaturedReference
     marks: ConstraintMasks
+    gap: FloatArray | None = None  # (m,) see `find_gaps`; None where lengths are not bound by it
     clearance: dict[str, float] | None = None  # what was done where sheets are near, see `Report`
 
 
 def clear(
     start: Start,
-    gap: FloatArray,
     share: float,
     finds_creases: bool,
     limit: Callable[[Mesh, FloatArray], FloatArray],
@@ -48,8 +48,6 @@ def clear(
     ----------
     start : Start
         With the lengths asked for in the reference; unchanged.
-    gap : (m,) float64
-        See `find_gaps`.
     share : float
         Of the gap, that chords may take.
     finds_creases : bool
@@ -59,6 +57,8 @@ def clear(
     build : callable
         Marks the features of a mesh that has its lengths, and builds the reference.
     """
+    gap = start.gap
+    assert gap is not None
     asked = start.featured.reference.X[:, 3]
     mesh = start.mesh.copy()
     is_feature = np.zeros(len(mesh.origin), np.bool_)
@@ -80,7 +80,7 @@ def clear(
         "shortest": float((lengths / asked).min()),
         "new_crease_edges": n_new // 2,
     }
-    return Start(mesh, featured, marks, clearance)
+    return Start(mesh, featured, marks, gap, clearance)
 
 
 def clearance_in_words(clearance: dict[str, float]) -> str:

@@ -28,6 +28,7 @@ from ..sweeps.flaws import (
     count_more_crossings,
     count_new_flaws,
     has_crossings_where_thin,
+    volume_change,
 )
 from ..sweeps.guard import Check, Guard, HoldingGuard
 from ..sweeps.loop import Stop, run_sweeps
@@ -55,6 +56,11 @@ _ON_THE_WAY_LARGE = 1.25
 
 # Shorter edges are worth their faces if no more than this share of the flaws is left.
 _WORTH = 0.5
+
+# A surface of which more than this share has another sheet near is looked at for a lost volume: rods and
+# tubes thinner than L lose three quarters of it, without a fold. Others lose a few percent at most.
+_MOSTLY = 0.1
+_LOSS = 0.1
 
 Lengths = float | ArrayLike | Callable[[FloatArray], ArrayLike] | Adaptive
 
@@ -107,6 +113,23 @@ class Swept:
     def is_clean(self) -> bool:
         """Whether nothing wrong is known."""
         return not (self.n_flaws or self.n_crossings)
+
+    @property
+    def loss(self) -> float:
+        """Share of its volume by which a closed surface has changed."""
+        return volume_change(self.start.mesh, self.work.mesh)
+
+    @property
+    def has_lost(self) -> bool:
+        """Whether a surface that is thin at many places has lost much of its volume."""
+        gap = self.start.gap
+        return gap is not None and np.isfinite(gap).mean() > _MOSTLY and self.loss > _LOSS
+
+    def is_far_better(self, other: Swept) -> bool:
+        """Whether no more than half of what is wrong with another one is wrong with this."""
+        if other.is_clean:
+            return self.is_clean and self.loss < _WORTH * other.loss
+        return self.n_flaws + self.n_crossings <= _WORTH * (other.n_flaws + other.n_crossings)
 
 
 class Job:
@@ -174,7 +197,8 @@ class Job:
         with monitor.watch.time("reference"):
             marks, length = self._set_lengths(meshes[0], L)
             featured = self._build_reference(meshes[0], marks)
-        start = Start(meshes[0].copy(), featured, marks)
+            gap = self._gaps(meshes[0], featured)
+        start = Start(meshes[0].copy(), featured, marks, gap)
         swept = self._without_flaws(meshes.pop(), start)
         work, stop = swept.work, swept.stop
         is_compact = has_finish(work)
@@ -197,16 +221,15 @@ class Job:
         """Sweep over a mesh, with care where that makes flaws: most meshes are done after one look."""
         best = self._swept(mesh, start, ())
         if not self.monitor.is_cancelled:
-            gap = self._gaps(start)
-            is_thin = None if gap is None else np.isfinite(gap)
+            is_thin = None if start.gap is None else np.isfinite(start.gap)
             if best.is_clean and has_crossings_where_thin(best.work.mesh, is_thin, self.parallel):
                 best = self._judged(best)
-            if not best.is_clean:
-                best = self._with_care(best, gap)
+            if not best.is_clean or best.has_lost:
+                best = self._with_care(best)
         self.monitor.counts = best.counts
         return replace(best, stop=Stop.CANCELLED) if self.monitor.is_cancelled else best
 
-    def _with_care(self, best: Swept, gap: FloatArray | None) -> Swept:
+    def _with_care(self, best: Swept) -> Swept:
         """Mend the flaws, or sweep again from before; returns the best of all.
 
         With shorter edges where sheets are near, and then with a guard. A guard against crossings takes
@@ -217,8 +240,8 @@ class Job:
         if has_folds and self._may_mend(best.work):
             mend_folds(best.work, best.start.mesh, make_schedule(self.recipe)[-1])
             best = self._judged(best)
-        if gap is not None and not best.is_clean and not self.monitor.is_cancelled:
-            best = self._with_clearance(best, gap)
+        if (not best.is_clean or best.has_lost) and not self.monitor.is_cancelled:
+            best = self._with_clearance(best)
             has_folds &= best.n_flaws > 0 or not best.start.clearance
         folds = FoldCheck(self.parallel)
         crossings = CrossingCheck(self.parallel, self.recipe.avoid_intersections)
@@ -231,7 +254,7 @@ class Job:
                 best = min(best, other, key=lambda swept: (swept.n_flaws, swept.n_crossings))
         return best
 
-    def _gaps(self, start: Start) -> FloatArray | None:
+    def _gaps(self, mesh: Mesh, featured: FeaturedReference) -> FloatArray | None:
         """Distances to the next sheet on either side of every face of the input; None if not asked for.
 
         A number of faces or vertices to be met is a stronger wish than lengths.
@@ -239,29 +262,33 @@ class Job:
         if self.recipe.clearance is None or self.plan.count:
             return None
         with self.monitor.watch.time("clearance"):
-            return find_gaps(start.featured.reference.tree, start.mesh, self.parallel)
+            return find_gaps(featured.reference.tree, mesh, self.parallel)
 
-    def _with_clearance(self, best: Swept, gap: FloatArray) -> Swept:
+    def _with_clearance(self, best: Swept) -> Swept:
         """Sweep again with shorter edges where sheets are near, if that is worth its faces."""
         with self.monitor.watch.time("clearance"):
-            share = self.recipe.clearance or 0.0
-            finds_creases = self.constraints.feature_angle == "auto"
-            build = self._build_reference
-            start = clear(best.start, gap, share, finds_creases, self._limited, build)
-        if (
-            start is None
-            or expected_faces(start.mesh.X, start.mesh.origin, start.mesh.X[:, 3].copy())
-            > self.plan.max_faces
-        ):
+            start = self._clear(best.start)
+        if start is None:
             return best
         try:
             other = self._judged(self._swept(start.mesh.copy(), start, ()))
         except OptionError:  # more faces than allowed, on the way
             return best
-        left, before = (swept.n_flaws + swept.n_crossings for swept in (other, best))
-        is_worth_it = count_elements(other.work.mesh, "faces") <= self.plan.max_faces
-        is_worth_it &= left <= _WORTH * before and not self.monitor.is_cancelled
-        return other if is_worth_it else best
+        if count_elements(other.work.mesh, "faces") > self.plan.max_faces:
+            return best
+        return other if not self.monitor.is_cancelled and other.is_far_better(best) else best
+
+    def _clear(self, start: Start) -> Start | None:
+        """Shorten lengths where sheets are near, if that is asked for and does anything."""
+        share = self.recipe.clearance
+        if share is None or start.gap is None:
+            return None
+        finds_creases = self.constraints.feature_angle == "auto"
+        cleared = clear(start, share, finds_creases, self._limited, self._build_reference)
+        if cleared is None:
+            return None
+        X, origin = cleared.mesh.X, cleared.mesh.origin
+        return cleared if expected_faces(X, origin, X[:, 3].copy()) <= self.plan.max_faces else None
 
     def _judged(self, swept: Swept) -> Swept:
         """Count flaws, and faces that have come to cross others."""

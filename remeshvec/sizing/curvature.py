@@ -35,6 +35,11 @@ _REACH = 1.0
 _FOLD = 0.25
 
 
+# Of the square of the reach. On a patch of two faces means lie on a line, but for rounding: triangles
+# of means say nothing there.
+_NOTHING = 1e-12
+
+
 def largest_curvature(
     X: FloatArray,
     origin: IndexArray,
@@ -250,7 +255,8 @@ def _differentiate(part, reach, means, weights, shapes):
         a, b, c = part[3 * f], part[3 * f + 1], part[3 * f + 2]
         ux, uy, uz = area_vector(means, a, b, c)
         area = sqrt(ux * ux + uy * uy + uz * uz)
-        if area == 0.0 or min(means[a, 6], means[b, 6], means[c, 6]) == 0.0:
+        nothing = _NOTHING * reach[a, 0] * reach[a, 0]
+        if area <= nothing or min(means[a, 6], means[b, 6], means[c, 6]) == 0.0:
             weights[3 * f : 3 * f + 3] = 0.0
             continue
         ux, uy, uz = ux / area, uy / area, uz / area

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.vocabulary import CURVE, DEAD, BoolArray, FloatArray, IndexArray, Mesh
+from ..core.vocabulary import CURVE, DEAD, NONE, BoolArray, FloatArray, IndexArray, Mesh
 from ..mesh.blocks import make_blocks
 from ..operations.folds import area_vectors, find_flat_faces, find_folds, has_folds
 from ..reference.crossings import crossing_faces
@@ -19,12 +19,16 @@ __all__ = [
     "count_more_crossings",
     "count_new_flaws",
     "has_crossings_where_thin",
+    "volume_change",
 ]
 
 # New flaws within so many target lengths of old ones are the old ones, moved; ...
 _NEAR = 1.0
 # ... as long as there is not so much more of them in all.
 _GROWTH = 1.02
+
+# Volumes below this, in the frame of the mesh, are rounding errors.
+_NO_VOLUME = 1e-12
 
 
 def _ends(mesh: Mesh, h: IndexArray) -> tuple[FloatArray, FloatArray]:
@@ -158,6 +162,20 @@ def has_crossings_where_thin(mesh: Mesh, is_thin: BoolArray | None, parallel: bo
     if not is_asked.any():
         return False
     return len(crossing_faces(tree_of(mesh, parallel), parallel, False, is_asked.any(axis=1))) > 0
+
+
+def volume_change(before: Mesh, after: Mesh) -> float:
+    """Share of its volume by which a closed surface has changed; 0 for an open one, or without volume."""
+    if (before.twin[before.origin != DEAD] == NONE).any():
+        return 0.0
+    volume, now = _volume(before), _volume(after)
+    return abs(now - volume) / volume if volume > _NO_VOLUME else 0.0
+
+
+def _volume(mesh: Mesh) -> float:
+    F = mesh.origin.reshape(-1, 3)
+    a, b, c = (mesh.X[F[F[:, 0] != DEAD, i], :3] for i in range(3))
+    return float(np.einsum("ij,ij", a, np.cross(b, c))) / 6.0
 
 
 def count_more_crossings(before: Mesh, after: Mesh, parallel: bool) -> int:

@@ -5,6 +5,7 @@ import pytest
 from helpers import threads, zoo
 
 from data.shapes.basic import icosphere
+from data.shapes.cad_parts import prism
 from data.shapes.hard import thin_ring
 from remeshvec import remesh
 
@@ -14,16 +15,12 @@ def hollow_ball(wall):
     return np.vstack([V, (1.0 - wall) * V]), np.vstack([F, F[:, ::-1] + len(V)])
 
 
-def thin_rods(n=6, width=1.0, length=200.0):
-    """Square rods on a circle, each as a box of twelve faces."""
-    V, F = zoo.cube()
-    parts = []
-    for k in range(n):
-        t = 2 * np.pi * k / n
-        x, y = np.array([np.cos(t), np.sin(t), 0]), np.array([-np.sin(t), np.cos(t), 0])
-        box = (V - V.mean(axis=0)) / np.ptp(V, axis=0) * (length, width, width)
-        parts.append(box @ np.array([x, y, (0.0, 0.0, 1.0)]) + 2.0 * length * x)
-    return np.vstack(parts), np.vstack([F + k * len(V) for k in range(n)])
+def thin_rods(n, length):
+    """Rods of eight sides, of radius 1, beside each other."""
+    t = 2 * np.pi * np.arange(8) / 8
+    V, F = prism(np.c_[np.cos(t), np.sin(t)], height=length)
+    shifted = [V + np.array([20.0 * k, 0.0, 0.0]) for k in range(n)]
+    return np.vstack(shifted), np.vstack([F + k * len(V) for k in range(n)])
 
 
 def crossing(result):
@@ -56,19 +53,22 @@ def test_faces_are_looked_at_where_there_are_no_creases():
     assert crossing(remesh(V, F, 0.3, clearance=None)) > 100
 
 
-def test_rods_thinner_than_the_length_keep_their_edges():
-    """No edge of theirs stands out at that scale: they lost a quarter of their volume."""
-    V, F = thin_rods()
-    volume = zoo.volume(V, F)
-    result = remesh(V, F, 12.0)
-    assert zoo.volume(*result) == pytest.approx(volume, rel=1e-6)
-    assert zoo.volume(*remesh(V, F, 12.0, clearance=None)) < 0.95 * volume
+@pytest.mark.parametrize(("length", "L"), [(200.0, 12.0), (400.0, 65.0), (30.0, 6.0)])
+def test_rods_thinner_than_the_length_keep_their_edges(length, L):
+    """None of them stands out at that scale: the rods lost up to nine tenths of their volume."""
+    V, F = thin_rods(3, length)
+    result = remesh(V, F, L)
+    assert zoo.volume(*result) == pytest.approx(zoo.volume(V, F), rel=1e-6)
+    assert result.report.clearance["new_crease_edges"] == 3 * 24
+    assert "more edges are creases" in result.report.stop
+    for options in ({"clearance": None}, {"feature_angle": None}):
+        assert zoo.volume(*remesh(V, F, L, **options)) < 0.8 * zoo.volume(V, F)
 
 
 def test_lengths_stay_where_nothing_crosses():
     """Sheets may be near, and bend: what comes out is the same, bit for bit."""
     V, F = hollow_ball(0.3)
-    for mesh, L in ((zoo.sphere(3), 0.2), ((V, F), 0.2), (zoo.cube(), 0.3)):
+    for mesh, L in ((icosphere(3), 0.2), ((V, F), 0.2), (zoo.cube(), 0.3)):
         result, other = remesh(*mesh, L), remesh(*mesh, L, clearance=None)
         assert result.report.clearance == {}
         assert np.array_equal(result.V, other.V) and np.array_equal(result.F, other.F)

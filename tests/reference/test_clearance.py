@@ -56,7 +56,11 @@ def test_between_two_plates_it_is_their_distance():
     square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)
     F = np.array([(0, 2, 1), (0, 3, 2)])
     below, above = np.c_[square, np.zeros(4)], np.c_[square, np.full(4, 0.1)]
-    V, facing, alike = np.vstack([below, above]), np.vstack([F, F[:, ::-1] + 4]), np.vstack([F, F + 4])
+    V, facing, alike = (
+        np.vstack([below, above]),
+        np.vstack([F, F[:, ::-1] + 4]),
+        np.vstack([F, F + 4]),
+    )
     assert gaps(V, facing, 1.0) == pytest.approx(0.1)
     assert np.isinf(gaps(V, facing, 0.07)).all()  # out of reach
     assert np.isinf(gaps(V, alike, 1.0)).all()  # sheets that look the same way

@@ -6,6 +6,7 @@ from helpers import zoo
 from helpers.structure import built
 from scipy.spatial import ConvexHull
 
+from data.shapes.cad_parts import prism
 from remeshvec.core.vocabulary import NONE
 from remeshvec.sizing.curvature import _part_fans, corner_curvature, largest_curvature
 
@@ -312,3 +313,13 @@ def test_at_corners_it_is_that_of_their_side():
     largest = np.zeros(len(V))
     np.maximum.at(largest, mesh.origin, found.ravel())
     assert np.array_equal(largest, largest_curvature(*arrays))
+
+
+def test_a_patch_of_two_flat_faces_has_none():
+    """Their means lie on a line, but for rounding: it was divided by next to nothing."""
+    t = 2 * np.pi * np.arange(8) / 8
+    V, F = prism(np.c_[np.cos(t), np.sin(t)], height=200.0)
+    mesh = built(V, F)
+    is_feature = sharp_edges(mesh, 40.0)
+    found = corner_curvature(mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge, is_feature)
+    assert found.max() < 1e-6
