@@ -1,9 +1,8 @@
-"""What the sweeps start from, and the same with shorter edges where sheets are near."""
+"""A start with shorter edges and more creases where sheets are near."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,24 +11,15 @@ from ..features.dihedral import find_dihedral_angles
 from ..input.constraints import ConstraintMasks
 from ..reference.build import FeaturedReference
 from ..reference.clearance import clearance_lengths
+from .swept import Start
 
-__all__ = ["Start", "clear", "clearance_in_words"]
+__all__ = ["clear", "clearance_in_words"]
 
 # Where sheets are near, lengths fall to this share of what was asked for at most: 16 times the faces.
 _LEAST_LENGTH = 1.0 / 4.0
 
 # Degrees from which edges are creases there, whatever stands out at the scale of the lengths.
 _SHARP = 40.0
-
-
-class Start(NamedTuple):
-    """What the sweeps start from."""
-
-    mesh: Mesh  # with its lengths and features; sweeps work on copies
-    featured: FeaturedReference
-    marks: ConstraintMasks
-    gap: FloatArray | None = None  # (m,) see `find_gaps`; None where lengths are not bound by it
-    clearance: dict[str, float] | None = None  # what was done where sheets are near, see `Report`
 
 
 def clear(

@@ -28,7 +28,6 @@ from ..sweeps.flaws import (
     count_more_crossings,
     count_new_flaws,
     has_crossings_where_thin,
-    volume_change,
 )
 from ..sweeps.guard import Check, Guard, HoldingGuard
 from ..sweeps.loop import Stop, run_sweeps
@@ -36,7 +35,8 @@ from ..sweeps.mending import mend_folds
 from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Adaptation, Count, Plan, make_schedule
 from ..sweeps.work import Work, is_large
-from .clearing import Start, clear, clearance_in_words
+from .clearing import clear, clearance_in_words
+from .swept import Start, Swept
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
 
@@ -53,14 +53,6 @@ _WAYS = {"to_input": "from the result to the input", "from_input": "from the inp
 _ON_THE_WAY = 32
 _LENT = 10_000_000
 _ON_THE_WAY_LARGE = 1.25
-
-# Shorter edges are worth their faces if no more than this share of the flaws is left.
-_WORTH = 0.5
-
-# A surface of which more than this share has another sheet near is looked at for a lost volume: rods and
-# tubes thinner than L lose three quarters of it, without a fold. Others lose a few percent at most.
-_MOSTLY = 0.1
-_LOSS = 0.1
 
 Lengths = float | ArrayLike | Callable[[FloatArray], ArrayLike] | Adaptive
 
@@ -96,40 +88,6 @@ class Remeshed:
     def count_held(self) -> int:
         """Count faces that had to stay."""
         return 0 if self.featured.held is None else int(self.featured.held.sum())
-
-
-@dataclass(frozen=True)
-class Swept:
-    """A mesh after the sweeps."""
-
-    start: Start
-    work: Work
-    stop: Stop
-    counts: list[dict[str, int]]
-    n_flaws: int  # vertices at flaws that the mesh did not have before
-    n_crossings: int = 0  # vertices of faces that cross others and did not, where they were counted
-
-    @property
-    def is_clean(self) -> bool:
-        """Whether nothing wrong is known."""
-        return not (self.n_flaws or self.n_crossings)
-
-    @property
-    def loss(self) -> float:
-        """Share of its volume by which a closed surface has changed."""
-        return volume_change(self.start.mesh, self.work.mesh)
-
-    @property
-    def has_lost(self) -> bool:
-        """Whether a surface that is thin at many places has lost much of its volume."""
-        gap = self.start.gap
-        return gap is not None and np.isfinite(gap).mean() > _MOSTLY and self.loss > _LOSS
-
-    def is_far_better(self, other: Swept) -> bool:
-        """Whether no more than half of what is wrong with another one is wrong with this."""
-        if other.is_clean:
-            return self.is_clean and self.loss < _WORTH * other.loss
-        return self.n_flaws + self.n_crossings <= _WORTH * (other.n_flaws + other.n_crossings)
 
 
 class Job:
