@@ -11,12 +11,17 @@ from ..features.dihedral import find_dihedral_angles
 from ..input.constraints import ConstraintMasks
 from ..reference.build import FeaturedReference
 from ..reference.clearance import clearance_lengths
-from .swept import Start
+from ..sweeps.flaws import find_flaws
+from .swept import Start, Swept
 
-__all__ = ["clear", "clearance_in_words"]
+__all__ = ["clear", "clearance_in_words", "near_flaws"]
 
 # Where sheets are near, lengths fall to this share of what was asked for at most: 16 times the faces.
 _LEAST_LENGTH = 1.0 / 4.0
+
+# Lengths become shorter within so many of them from a flaw. Bounding them everywhere gave three times the
+# faces on a part with one place where faces crossed.
+_NEAR = 2.0
 
 # Degrees from which edges are creases there, whatever stands out at the scale of the lengths.
 _SHARP = 40.0
@@ -25,6 +30,7 @@ _SHARP = 40.0
 def clear(
     start: Start,
     share: float,
+    near: BoolArray | None,
     finds_creases: bool,
     limit: Callable[[Mesh, FloatArray], FloatArray],
     build: Callable[[Mesh, ConstraintMasks], FeaturedReference],
@@ -40,6 +46,8 @@ def clear(
         With the lengths asked for in the reference; unchanged.
     share : float
         Of the gap, that chords may take.
+    near : (n,) bool, optional
+        Where lengths may become shorter; everywhere by default.
     finds_creases : bool
         Whether edges may become creases.
     limit : callable
@@ -58,6 +66,8 @@ def clear(
         is_feature |= _sharp_edges(start, gap)
     bound = clearance_lengths(mesh, is_feature, gap, share)
     lengths = np.minimum(asked, np.maximum(bound, _LEAST_LENGTH * asked))
+    if near is not None:
+        lengths[~near] = asked[~near]
     is_shorter = lengths < asked
     n_new = int(is_feature.sum()) - n_creases
     if not (is_shorter.any() or n_new):
@@ -71,6 +81,20 @@ def clear(
         "new_crease_edges": n_new // 2,
     }
     return Start(mesh, featured, marks, gap, clearance)
+
+
+def near_flaws(swept: Swept, parallel: bool) -> BoolArray:
+    """Tell which vertices of the input are near new flaws, or corners of faces they are born on."""
+    mesh, start = swept.work.mesh, swept.start
+    v = find_flaws(start.mesh, mesh, parallel)
+    X, F = start.featured.reference.X, start.featured.reference.origin.reshape(-1, 3)
+    near = np.zeros(len(X), np.bool_)
+    if len(v):
+        from scipy.spatial import cKDTree
+
+        near |= cKDTree(mesh.X[v, :3]).query(X[:, :3])[0] <= _NEAR * X[:, 3]
+        near[F[mesh.birth[v] // 3]] = True
+    return near
 
 
 def clearance_in_words(clearance: dict[str, float]) -> str:

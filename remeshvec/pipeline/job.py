@@ -35,7 +35,7 @@ from ..sweeps.mending import mend_folds
 from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Adaptation, Count, Plan, make_schedule
 from ..sweeps.work import Work, is_large
-from .clearing import clear, clearance_in_words
+from .clearing import clear, clearance_in_words, near_flaws
 from .swept import Start, Swept
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
@@ -225,7 +225,7 @@ class Job:
     def _with_clearance(self, best: Swept) -> Swept:
         """Sweep again with shorter edges where sheets are near, if that is worth its faces."""
         with self.monitor.watch.time("clearance"):
-            start = self._clear(best.start)
+            start = self._clear(best)
         if start is None:
             return best
         try:
@@ -236,13 +236,16 @@ class Job:
             return best
         return other if not self.monitor.is_cancelled and other.is_far_better(best) else best
 
-    def _clear(self, start: Start) -> Start | None:
+    def _clear(self, best: Swept) -> Start | None:
         """Shorten lengths where sheets are near, if that is asked for and does anything."""
         share = self.recipe.clearance
-        if share is None or start.gap is None:
+        if share is None or best.start.gap is None:
             return None
-        finds_creases = self.constraints.feature_angle == "auto"
-        cleared = clear(start, share, finds_creases, self._limited, self._build_reference)
+        finds_creases = best.has_lost and self.constraints.feature_angle == "auto"
+        near = None if best.has_lost else near_flaws(best, self.parallel)
+        cleared = clear(
+            best.start, share, near, finds_creases, self._limited, self._build_reference
+        )
         if cleared is None:
             return None
         X, origin = cleared.mesh.X, cleared.mesh.origin

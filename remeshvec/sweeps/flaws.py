@@ -18,6 +18,7 @@ __all__ = [
     "FoldCheck",
     "count_more_crossings",
     "count_new_flaws",
+    "find_flaws",
     "has_crossings_where_thin",
     "volume_change",
 ]
@@ -146,6 +147,16 @@ def count_new_flaws(before: Mesh, after: Mesh, crossings: bool, parallel: bool) 
         check.remember(before, lazy_tree(before, parallel))
         count += check.offenders(after, lazy_tree(after, parallel)).size
     return count + (_new_crossings(before, after, True, parallel)[0] if crossings else 0)
+
+
+def find_flaws(before: Mesh, after: Mesh, parallel: bool) -> IndexArray:
+    """Find the vertices at flaws and crossings that a mesh has and an earlier one has not."""
+    trees = [lazy_tree(mesh, parallel) for mesh in (before, after)]
+    found = []
+    for check in (FoldCheck(parallel), CrossingCheck(parallel, False)):
+        check.remember(before, trees[0])
+        found.append(check.offenders(after, trees[1]).vertices)
+    return np.unique(np.concatenate(found))
 
 
 def has_crossings_where_thin(mesh: Mesh, is_thin: BoolArray | None, parallel: bool) -> bool:
