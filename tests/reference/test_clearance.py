@@ -47,7 +47,7 @@ def slow_gaps(V, F, L):
                 np.cross(corners[g, (i + 1) % 3] - corners[g, i], hit - corners[g, i]) @ normal[g]
                 for i in range(3)
             ]
-            if min(sides) > 0 and abs(t) < 1.25 * L:
+            if min(sides) > 0 and abs(t) < 0.5 * L:
                 found[f] = min(found[f], abs(t))
     return found
 
