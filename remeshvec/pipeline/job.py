@@ -228,13 +228,19 @@ class Job:
             start = self._clear(best)
         if start is None:
             return best
-        try:
-            other = self._judged(self._swept(start.mesh.copy(), start, ()))
-        except OptionError:  # more faces than allowed, on the way
-            return best
-        if count_elements(other.work.mesh, "faces") > self.plan.max_faces:
-            return best
-        return other if not self.monitor.is_cancelled and other.is_far_better(best) else best
+        # A lost volume is one flaw; folds instead of it must not be left, so a guard is tried as well.
+        guards: list[tuple[Check, ...]] = [(), (FoldCheck(self.parallel),)]
+        for checks in guards[: 1 + best.is_clean]:
+            try:
+                other = self._judged(self._swept(start.mesh.copy(), start, checks))
+            except OptionError:  # more faces than allowed, on the way
+                break
+            if self.monitor.is_cancelled:
+                break
+            n_faces = count_elements(other.work.mesh, "faces")
+            if n_faces <= self.plan.max_faces and other.is_far_better(best):
+                return other
+        return best
 
     def _clear(self, best: Swept) -> Start | None:
         """Shorten lengths where sheets are near, if that is asked for and does anything."""
