@@ -101,6 +101,7 @@ REMESH = {
     "untangle_angle": NOT_ANGLES,
     "fit": NOT_FLAGS,
     "avoid_intersections": NOT_FLAGS,
+    "clearance": [*NOT_POSITIVE, 1.1],
     "feature_angle": [True, "1", "x", NAN, INF, -1.0, 181.0, [30.0], {}],
     "corner_angle": [*NOT_POSITIVE, 181.0],
     "feature_edges": [

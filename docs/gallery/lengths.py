@@ -8,7 +8,7 @@ from benchmarks.meshes import load_arrays
 from benchmarks.panels import Panel, Picture, by_amount, face_distances
 from remeshvec import Adaptive, remesh
 
-from .scene import CREATURE, SHEET, panel, side_by_side
+from .scene import CREATURE, SHEET, crossing_faces, panel, side_by_side
 
 
 def L() -> Picture:
@@ -75,4 +75,9 @@ def max_deviation() -> Picture:
     return side_by_side(panels, CREATURE)
 
 
-PICTURES = (L, L_array, adaptive, gradation, n_faces, n_vertices, max_deviation)
+def clearance() -> Picture:
+    """Shorter edges where chords would reach the next sheet."""
+    return crossing_faces([{"clearance": share} for share in (None, 0.4)])
+
+
+PICTURES = (L, L_array, adaptive, gradation, n_faces, n_vertices, max_deviation, clearance)

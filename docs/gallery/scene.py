@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.panels import FloatArray, IntArray, Panel, Picture, by_amount
+from data.shapes.basic import icosphere
+from remeshvec import remesh
 
 CREATURE = (20.0, 15.0)  # views: degrees to the right of the front, upwards
 BRACKET = (35.0, 30.0)
@@ -34,6 +36,22 @@ def smallest_angles(V: FloatArray, F: IntArray) -> FloatArray:
 def lengths(V: FloatArray, F: IntArray) -> FloatArray:
     """Lengths of the edges of every face, (m, 3)."""
     return np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2)
+
+
+def crossing_faces(choices: list[dict[str, Any]]) -> Picture:
+    """Show a hollow ball whose wall is thinner than a chord bulges, with faces that cross in colour."""
+    outside, F = icosphere(4)
+    V, F = np.vstack([outside, 0.988 * outside]), np.vstack([F, F[:, ::-1] + len(outside)])
+    panels = []
+    for choice in choices:
+        result = remesh(V, F, 0.3, **choice)
+        crossing = result.report.find_defects(check_intersections=True).crossing
+        amount = np.zeros(len(result.F))
+        amount[crossing] = 1.0
+        caption = ", ".join(f"{name}={value}" for name, value in choice.items())
+        note = f", {len(crossing)} of them cross others"
+        panels.append(panel(caption, result, by_amount(amount, 1.0), note))
+    return side_by_side(panels, (20.0, 35.0))
 
 
 def by_angle(result: Any, worst: float = 36.0, good: float = 46.0) -> Any:

@@ -12,7 +12,7 @@ from ..core.vocabulary import DEFAULT_LENGTH_FACTOR
 from ..errors import OptionError
 from ..files.data_files import COMMON_SUFFIXES
 from ..files.mesh_files import MeshFile
-from ..input.options import OPTION_NAMES, Boundary, Preset
+from ..input.options import CLEARANCE, OPTION_NAMES, Boundary, Preset
 from ..measures.quality import quality
 from ..sizing.adaptive import Adaptive
 from .parser import OneLineParser
@@ -232,6 +232,8 @@ def given_options(options: argparse.Namespace) -> dict[str, Any]:
     }
     if options.feature_angle is None:  # "none" differs from the default
         given["feature_angle"] = None
+    if options.clearance is None:
+        given["clearance"] = None
     if options.no_project:
         given["project"] = False
     return given
@@ -277,6 +279,14 @@ def _add_size_options(
         type=_positive_number,
         metavar="D",
         help="largest distance between the input and the result",
+    )
+    group.add_argument(
+        "--clearance",
+        type=_positive_or_none,
+        default=CLEARANCE,
+        metavar="X",
+        help="shorten edges where faces cross or fold and chords take more than this share of the gap to "
+        "the next sheet (default %(default)s); none: nowhere",
     )
     return length
 
@@ -456,6 +466,10 @@ def _positive_number(text: str) -> float:
     if not (value > 0 and math.isfinite(value)):
         raise argparse.ArgumentTypeError(f"{text} is not a positive number")
     return value
+
+
+def _positive_or_none(text: str) -> float | None:
+    return None if text == "none" else _positive_number(text)
 
 
 def _at_least_one(text: str) -> int:

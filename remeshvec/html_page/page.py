@@ -282,6 +282,7 @@ def _call(report: Report, command: str) -> str:
     rows += [(f"input: {_words(name)}", f"{n:,}") for name, n in report.dirt.items()]
     rows += [(f"features: {_words(name)}", f"{n:,}") for name, n in report.features.items() if n]
     rows += [(f"deviation {_words(way)}", f"{d:.4g}") for way, d in report.deviation.items()]
+    rows += [(f"clearance: {_words(name)}", f"{x:,.4g}") for name, x in report.clearance.items()]
     rows += [("remeshvec", __version__)]
     return _table(rows)
 

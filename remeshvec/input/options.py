@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..core.shown import given_fields
 
 __all__ = [
+    "CLEARANCE",
     "MAX_FACES",
     "OPTION_NAMES",
     "OTHER_NAMES",
@@ -26,6 +27,7 @@ __all__ = [
 ]
 
 MAX_FACES = 50_000_000
+CLEARANCE = 0.4
 
 Preset = Literal["default", "even", "fast", "fine"]
 Boundary = Literal["free", "split", "fixed"]
@@ -54,6 +56,7 @@ class RemeshOptions:
     n_vertices: int | None = None
     gradation: float = 1.5
     max_deviation: float | None = None
+    clearance: float | None = CLEARANCE
     # What to keep.
     feature_angle: FeatureAngle = "auto"
     corner_angle: float | None = None
@@ -97,6 +100,7 @@ class RemeshKeywords(TypedDict, total=False):
     n_vertices: int | None
     gradation: float
     max_deviation: float | None
+    clearance: float | None
     feature_angle: FeatureAngle
     corner_angle: float | None
     feature_edges: ArrayLike | None

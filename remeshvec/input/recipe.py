@@ -12,7 +12,7 @@ import numpy as np
 from ..core.arguments import choice, count, flag, number
 from ..core.threads import available_threads
 from ..errors import OptionError
-from .options import RemeshOptions
+from .options import CLEARANCE, RemeshOptions
 
 __all__ = ["PRESETS", "Recipe", "make_recipe"]
 
@@ -58,6 +58,7 @@ class Recipe:
     fit_rounds: int = 0
     tol: float | None = None  # stop where a sweep changes less
     max_deviation: float | None = None  # distance from the input, in its units
+    clearance: float | None = CLEARANCE  # share of the gap to the next sheet that chords may take
     avoid_intersections: bool = False  # no face may cross another that did not
     threads: int = 1
 
@@ -130,6 +131,8 @@ def make_recipe(options: RemeshOptions) -> Recipe:
         "split": _schedule("split", options.split, base.split, iterations),
         "threads": count(given.get("threads", available_threads()), "threads"),
     }
+    if options.clearance is None:  # differs from the default
+        changes["clearance"] = None
     for name, check in _CHECKS.items():
         if name in given:
             changes[name] = check(given[name], name)
@@ -153,6 +156,7 @@ _CHECKS = {
     "untangle_angle": _angle,
     "tol": lambda value, name: number(value, name, low=0.0, high=1.0),
     "max_deviation": lambda value, name: number(value, name, above=0.0, unit="units of V"),
+    "clearance": lambda value, name: number(value, name, above=0.0, high=1.0),
     "sliver_check": flag,
     "project": flag,
     "avoid_intersections": flag,

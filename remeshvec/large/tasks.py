@@ -27,6 +27,7 @@ from ..sweeps.care import Sweeper
 from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Plan
 from ..sweeps.rounds import run_rounds
+from ..sweeps.swept import start_of
 from ..sweeps.work import Work, is_large
 from .choice import better_regions
 from .index import Index, load_index
@@ -137,10 +138,9 @@ def _sweep(
     # against that takes several times as long.
     at_cuts = piece.vertices[np.isin(piece.vertices, parts.shared)]
     tolerated = np.array(whole.X[at_cuts, :3]) if len(at_cuts) else None
-    sweeper = Sweeper(
-        piece.reference.featured, plan, monitor, may_run_parallel, parallel, tolerated
-    )
-    result = sweeper.sweep([piece.mesh.copy()]).work.mesh
+    sweeper = Sweeper(plan, monitor, may_run_parallel, parallel, tolerated)
+    start = start_of(piece.mesh, piece.reference.featured)
+    result = sweeper.sweep([piece.mesh.copy()], start).work.mesh
     changed = recognise(piece, result)
     chords = new_chords(piece, changed, np.asarray(parts.shared))
     if len(chords):

@@ -50,6 +50,10 @@ class Report:
         samples of the result (21 a face, on a grid) to the input, and "from_input" from such samples of
         the input to the result. With ``max_deviation`` no sample exceeds 0.8 times the bound; what lies
         between samples is not looked at.
+    clearance : dict
+        What was done where faces came to cross or to fold because sheets are near; empty if nothing. At
+        how many "vertices" of the input lengths are shorter, to which share of what was asked for they
+        fall ("shortest"), and how many edges were found to be creases besides ("new_crease_edges").
     """
 
     target_length: float
@@ -60,6 +64,7 @@ class Report:
     dirt: dict[str, int]
     features: dict[str, int]
     deviation: dict[str, float]
+    clearance: dict[str, float]
     before: tuple[ArrayLike, ArrayLike]
     after: tuple[ArrayLike, ArrayLike]
     turned: Callable[[], IntArray]
@@ -150,6 +155,7 @@ class Report:
             "dirt": self.dirt,
             "features": self.features,
             "deviation": self.deviation,
+            "clearance": self.clearance,
             "defects": self.defects.to_dict(),
             "quality_before": self.quality_before.to_dict(),
             "quality_after": self.quality_after.to_dict(),

@@ -63,7 +63,7 @@ def remesh_arrays(V: Any, F: Any, L: Any, options: RemeshOptions) -> RemeshResul
         before = _kept(V, vertices), faces.astype(np.int32)
     report = Report(
         done.length, recipe, done.counts, watch.stop(), done.stop, job.prepared.dirt,
-        done.featured.counts, done.deviation, before=before, after=(V2, out.F),
+        done.featured.counts, done.deviation, done.clearance, before=before, after=(V2, out.F),
         turned=LazyRecipe(partial(turned_faces, out.provenance)),
     )  # fmt: skip
     if done.missed and recipe.max_deviation is not None:

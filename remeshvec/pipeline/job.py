@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import sqrt
 
 from numpy.typing import ArrayLike
@@ -15,7 +15,8 @@ from ..input.constraints import ConstraintMasks, Constraints
 from ..input.prepare import Prepared
 from ..input.recipe import Recipe
 from ..reference.build import FeaturedReference, build_reference
-from ..sizing.adaptive import Adaptive
+from ..reference.clearance import find_gaps
+from ..sizing.adaptive import Adaptive, expected_faces
 from ..sizing.target_lengths import adaptive_limits, limited_lengths, mesh_size, set_lengths
 from ..sweeps.care import Sweeper
 from ..sweeps.counts import count_elements
@@ -23,7 +24,9 @@ from ..sweeps.finish import deviation_of, has_finish
 from ..sweeps.loop import Stop
 from ..sweeps.monitor import Monitor
 from ..sweeps.plan import Adaptation, Count, Plan
+from ..sweeps.swept import Start, Swept, start_of
 from ..sweeps.work import is_large
+from .clearing import clear, clearance_in_words, near_flaws
 
 __all__ = ["Job", "Lengths", "Remeshed", "Sizing", "meet_count"]
 
@@ -66,6 +69,7 @@ class Remeshed:
     stop: str  # why the sweeps ended, in words
     deviation: dict[str, float]  # from the input, in its units
     missed: str = ""  # which bound does not hold, in words
+    clearance: dict[str, float] = field(default_factory=dict)  # see `Report`
 
     def count(self, noun: str) -> int:
         """Count faces or vertices."""
@@ -139,10 +143,15 @@ class Job:
         """Remesh the mesh in a list, which is emptied, so that nothing holds it once it is replaced."""
         monitor = self.monitor
         with monitor.watch.time("reference"):
-            featured, length = self.build_reference(meshes[0], L)
-        sweeper = Sweeper(featured, self.plan, monitor, self.may_run_parallel, self.parallel)
-        swept = sweeper.sweep(meshes)
-        work, stop, n_flaws = swept.work, swept.stop, swept.n_flaws
+            marks, length = self._set_lengths(meshes[0], L)
+            featured = self._build_reference(meshes[0], marks)
+            gap = self._gaps(meshes[0], featured)
+        start = start_of(meshes[0], featured, marks, gap)
+        sweeper = Sweeper(
+            self.plan, monitor, self.may_run_parallel, self.parallel, clear=self._clear
+        )
+        swept = sweeper.sweep(meshes, start)
+        work, stop = swept.work, swept.stop
         is_compact = has_finish(work)
         deviation = deviation_of(work)
         missed = _missed(deviation, self.recipe.max_deviation, self.sizing.L)
@@ -150,18 +159,52 @@ class Job:
             work.mesh,
             is_compact,
             not (work.was_guarded or self.recipe.fit_rounds),
-            featured,
+            work.featured,
             length / self.prepared.scale,
             monitor.counts,
-            "; ".join(filter(None, (_in_words(stop, self.recipe.tol, n_flaws), missed))),
+            "; ".join(filter(None, (_in_words(stop, self.recipe.tol, swept), missed))),
             deviation,
             missed,
+            swept.start.clearance or {},
         )
+
+    def _gaps(self, mesh: Mesh, featured: FeaturedReference) -> FloatArray | None:
+        """Distances to the next sheet on either side of every face of the input; None if not asked for.
+
+        A number of faces or vertices to be met is a stronger wish than lengths.
+        """
+        if self.recipe.clearance is None or self.plan.count:
+            return None
+        with self.monitor.watch.time("clearance"):
+            return find_gaps(featured.reference.tree, mesh, self.parallel)
+
+    def _clear(self, best: Swept) -> Start | None:
+        """Shorten lengths where sheets are near, if that is asked for and does anything."""
+        share = self.recipe.clearance
+        if share is None or best.start.gap is None:
+            return None
+        finds_creases = best.has_lost and self.constraints.feature_angle == "auto"
+        near = None if best.has_lost else near_flaws(best, self.parallel)
+        cleared = clear(
+            best.start, share, near, finds_creases, self._limited, self._build_reference
+        )
+        if cleared is None:
+            return None
+        X, origin = cleared.mesh.X, cleared.mesh.origin
+        return cleared if expected_faces(X, origin, X[:, 3].copy()) <= self.plan.max_faces else None
+
+    def _limited(self, mesh: Mesh, lengths: FloatArray) -> FloatArray:
+        """Bound the growth of lengths over a mesh."""
+        return limited_lengths(self.prepared._replace(mesh=mesh), lengths, self.sizing.gradation)
 
     def build_reference(self, mesh: Mesh, L: Lengths | None) -> tuple[FeaturedReference, float]:
         """Set the lengths of a mesh, mark its features, build the reference."""
         marks, length = self._set_lengths(mesh, L)
-        featured = build_reference(
+        return self._build_reference(mesh, marks), length
+
+    def _build_reference(self, mesh: Mesh, marks: ConstraintMasks) -> FeaturedReference:
+        """Mark the features of a mesh that has its lengths, build the reference."""
+        return build_reference(
             mesh,
             self.prepared.vertex_source,
             self.constraints.feature_angle,
@@ -170,7 +213,6 @@ class Job:
             self.parallel,
             self.constraints.corner_angle,
         )
-        return featured, length
 
     def _set_lengths(self, mesh: Mesh, L: Lengths | None) -> tuple[ConstraintMasks, float]:
         """Set the lengths of a mesh; returns what must stay, and the length of the mean new edge."""
@@ -209,15 +251,17 @@ def _adaptation(prepared: Prepared, sizing: Sizing) -> Adaptation | None:
     )
 
 
-def _in_words(stop: Stop, tol: float | None, n_flaws: int) -> str:
+def _in_words(stop: Stop, tol: float | None, swept: Swept) -> str:
     words = str(stop.value)
     if stop is Stop.CONVERGED:
         words += (
             f" (tol): the last sweep changed less than {tol:g} of the edges and moved "
             f"vertices by less than {tol:g} L"
         )
-    if n_flaws:
-        words += f"; new flaws at {n_flaws} vertices, see report.defects"
+    if swept.start.clearance:
+        words += f"; {clearance_in_words(swept.start.clearance)}"
+    if swept.n_flaws:
+        words += f"; new flaws at {swept.n_flaws} vertices, see report.defects"
     return words
 
 

@@ -98,6 +98,13 @@ def remesh(
         Largest distance between input and result, both ways, in the units of ``V``. Edges become
         shorter than ``L`` where that needs it. See ``report.deviation`` for what was measured; a
         `RemeshWarning` says where the bound is not met.
+    clearance : float or None
+        Largest share of the gap between two sheets that face each other which chords may take. Near
+        places where faces come to cross or to fold, edges that would take more become shorter than
+        ``L``, by a factor of 4 at most. Where a closed surface of thin parts loses a tenth of its
+        volume, they do everywhere, and edges there that turn by more than 40 degrees become creases
+        (with ``feature_angle="auto"``). ``report.clearance`` says at how many vertices, and how much.
+        Not with ``n_faces`` and ``n_vertices``. None: lengths stay as they are.
     feature_angle : "auto", float or None
         Which creases to keep. ``"auto"``: those that turn more than their surroundings at the scale of
         ``L``, so that a part keeps its edges and a scan does not freeze its noise. Degrees: all edges

@@ -11,7 +11,7 @@ from ..core.geometry import face_vector
 from ..core.vocabulary import BoolArray, IndexArray, Tree
 from .bvh import ARITY, LEAF, STACK, corner
 
-__all__ = ["crossing_faces"]
+__all__ = ["box_meets", "crossing_faces"]
 
 # An end of an edge lies on one side of a plane only from this distance on: in the frame of the mesh,
 # smaller distances are rounding errors.
@@ -71,7 +71,7 @@ def _mark_crossed(tree, f, adjacent, is_asked, are_all, stack, marks):
         # Boxes of earlier faces alone are left out, if these ask for themselves.
         first = f // (LEAF * np.int64(ARITY) ** (d - 1)) if are_all else 0
         for j in range(start + max(ARITY * i, first), end):
-            if _box_meets(tree.boxes, j, low, high):
+            if box_meets(tree.boxes, j, low, high):
                 stack[0, size] = j - start
                 stack[1, size] = d - 1
                 size += 1
@@ -102,7 +102,8 @@ def _meets(corners, g, low, high):
 
 
 @inlined
-def _box_meets(boxes, j, low, high):
+def box_meets(boxes, j, low, high):
+    """Tell whether a box of the tree meets another one."""
     return (
         boxes[j, 0] <= high[0]
         and boxes[j, 1] <= high[1]

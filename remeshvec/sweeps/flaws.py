@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.vocabulary import CURVE, DEAD, BoolArray, FloatArray, IndexArray, Mesh, Tree
+from ..core.vocabulary import CURVE, DEAD, NONE, BoolArray, FloatArray, IndexArray, Mesh, Tree
 from ..mesh.blocks import make_blocks
 from ..operations.folds import area_vectors, find_flat_faces, find_folds, has_folds
 from ..operations.turned import find_turned_faces
@@ -20,13 +20,18 @@ __all__ = [
     "TurnedCheck",
     "count_more_crossings",
     "count_new_flaws",
-    "has_crossings_at_curves",
+    "find_flaws",
+    "has_crossings_where_thin",
+    "volume_change",
 ]
 
 # New flaws within so many target lengths of old ones are the old ones, moved; ...
 _NEAR = 1.0
 # ... as long as there is not so much more of them in all.
 _GROWTH = 1.02
+
+# Volumes below this, in the frame of the mesh, are rounding errors.
+_NO_VOLUME = 1e-12
 
 
 def _ends(mesh: Mesh, h: IndexArray) -> tuple[FloatArray, FloatArray]:
@@ -203,18 +208,44 @@ def count_new_flaws(
     return count + (_new_crossings(before, after, True, parallel)[0] if crossings else 0)
 
 
-def has_crossings_at_curves(mesh: Mesh, parallel: bool) -> bool:
-    """Tell whether faces at curves cross others that they share no corner with.
+def find_flaws(before: Mesh, after: Mesh, parallel: bool) -> IndexArray:
+    """Find the vertices at flaws and crossings that a mesh has and an earlier one has not."""
+    trees = [lazy_tree(mesh, parallel) for mesh in (before, after)]
+    found = []
+    for check in (FoldCheck(parallel), CrossingCheck(parallel, False)):
+        check.remember(before, trees[0])
+        found.append(check.offenders(after, trees[1]).vertices)
+    return np.unique(np.concatenate(found))
+
+
+def has_crossings_where_thin(mesh: Mesh, is_thin: BoolArray | None, parallel: bool) -> bool:
+    """Tell whether faces at curves, or born on thin faces, cross others that they share no corner with.
 
     Chords of curves leave the surface farthest: where walls are thin, faces cross there first. To ask
-    about all faces takes a third of a call.
+    about all faces takes a third of a call. ``is_thin`` are (m,) faces of the reference.
     """
     F = mesh.origin.reshape(-1, 3)
     F = F[F[:, 0] != DEAD]
-    at_curve = (mesh.kind >= CURVE)[F].any(axis=1)
-    if not at_curve.any():
+    is_asked = mesh.kind[F] >= CURVE
+    if is_thin is not None:
+        is_asked |= is_thin[mesh.birth[F] // 3]
+    if not is_asked.any():
         return False
-    return len(crossing_faces(tree_of(mesh, parallel), parallel, False, at_curve)) > 0
+    return len(crossing_faces(tree_of(mesh, parallel), parallel, False, is_asked.any(axis=1))) > 0
+
+
+def volume_change(before: Mesh, after: Mesh) -> float:
+    """Share of its volume by which a closed surface has changed; 0 for an open one, or without volume."""
+    if (before.twin[before.origin != DEAD] == NONE).any():
+        return 0.0
+    volume, now = _volume(before), _volume(after)
+    return abs(now - volume) / volume if volume > _NO_VOLUME else 0.0
+
+
+def _volume(mesh: Mesh) -> float:
+    F = mesh.origin.reshape(-1, 3)
+    a, b, c = (mesh.X[F[F[:, 0] != DEAD, i], :3] for i in range(3))
+    return float(np.einsum("ij,ij", a, np.cross(b, c))) / 6.0
 
 
 def count_more_crossings(before: Mesh, after: Mesh, parallel: bool) -> int:

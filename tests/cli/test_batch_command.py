@@ -50,6 +50,7 @@ def test_options_reach_the_library(folder, asked):
     assert asked[-1] == {
         "L": None,
         "preset": "default",
+        "clearance": 0.4,
         "feature_angle": "auto",
         "boundary": "free",
     }

@@ -105,7 +105,8 @@ def test_statistics_of_what_json_lacks_are_null(sheet, monkeypatch):
 def test_default_options_are_left_to_the_library(sheet, asked):
     assert main([sheet]) == 0
     assert isinstance(asked[0].pop("callback"), ProgressLine)
-    assert asked == [{"L": None, "preset": "default", "feature_angle": "auto", "boundary": "free"}]
+    defaults = {"preset": "default", "feature_angle": "auto", "boundary": "free", "clearance": 0.4}
+    assert asked == [{"L": None, **defaults}]
 
 
 def test_options_reach_the_library(sheet, asked):
@@ -116,6 +117,7 @@ def test_options_reach_the_library(sheet, asked):
         {
             "L": 0.2,
             "preset": "fast",
+            "clearance": 0.4,
             "feature_angle": "auto",
             "boundary": "free",
             "iterations": 2,

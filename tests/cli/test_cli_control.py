@@ -55,6 +55,8 @@ def test_constraints(asked):
     assert call["corner_angle"] == 70.0
     assert main(["in.obj", "--feature-angle", "none", "--quiet"]) == 0
     assert asked[-1]["feature_angle"] is None
+    assert main(["in.obj", "--clearance", "none", "--quiet"]) == 0
+    assert asked[-1]["clearance"] is None
 
 
 def test_everything_is_saved(asked, capsys):

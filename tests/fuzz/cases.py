@@ -101,6 +101,7 @@ def _options(rng: Generator, V: np.ndarray, F: np.ndarray) -> dict[str, Any]:
         "n_vertices": (0.02, lambda: size(rng, 4, 1500)),
         "gradation": (0.1, lambda: float(rng.uniform(1.05, 3))),
         "max_deviation": (0.06, lambda: mean_edge(V, F) * log_uniform(rng, 0.02, 1)),
+        "clearance": (0.1, lambda: [None, float(rng.uniform(0.05, 1))][rng.integers(2)]),
         "feature_angle": (0.4, lambda: [None, float(rng.uniform(10, 120))][rng.integers(2)]),
         "boundary": (0.4, lambda: str(rng.choice(["split", "fixed"]))),
         "feature_edges": (0.1, lambda: _some_edges(rng, F)),

@@ -18,6 +18,7 @@ import pytest
 from helpers import zoo
 
 import remeshvec
+from data.shapes.hard import thin_ring
 from remeshvec import html_page, html_report, remesh, write_html, write_mesh
 from remeshvec.cli.command import main
 from remeshvec.errors import MeshFormatError, OptionError, RemeshvecError
@@ -84,6 +85,12 @@ def test_dirt_features_and_deviation_are_told():
         assert f"input: {name.replace('_', ' ')} {count:,}" in text
     assert dirtied.report.dirt and "deviation to input" in text
     assert "max deviation 0.05" in text
+
+
+def test_clearance_is_told():
+    result = remesh(*thin_ring(0.006), 0.3)
+    text = text_of(html_report(result))
+    assert "clearance: vertices 400" in text and "where sheets are near" in text
 
 
 def test_the_views_hold_both_meshes(result):

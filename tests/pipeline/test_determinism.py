@@ -44,6 +44,7 @@ from remeshvec.operations.unfold import undo_folded_edges, undo_folds
 from remeshvec.operations.untangle import untangle_vertices
 from remeshvec.output import extract
 from remeshvec.reference.bvh import Surface, closest_faces
+from remeshvec.reference.clearance import find_gaps
 from remeshvec.reference.crossings import crossing_faces
 from remeshvec.sizing.target_lengths import mesh_size
 from remeshvec.sweeps.guard import tree_of
@@ -226,6 +227,12 @@ def test_every_kernel_is_the_same_in_any_order(monkeypatch):
         assert_same_bits(ready[0][0], one[0])
         same(tuple(ready[0][1]), tuple(one[1]))
     current, reference = ready[0]
+    far = copied(current)
+    far.X[:, 3] *= 20.0
+    gaps = in_every_way(lambda p: find_gaps(reference.tree, far, p))
+    assert np.isfinite(gaps[0]).any()
+    for one in gaps[1:]:
+        same(gaps[0], one)
     for _ in range(2):
         blocks = blocks_of(current, 100, monkeypatch)
         assert len(blocks.face) > 10

@@ -6,8 +6,9 @@ from helpers import zoo
 from helpers.structure import built
 from scipy.spatial import ConvexHull
 
+from data.shapes.cad_parts import prism
 from remeshvec.core.vocabulary import NONE
-from remeshvec.sizing.curvature import _part_fans, largest_curvature
+from remeshvec.sizing.curvature import _part_fans, corner_curvature, largest_curvature
 
 
 def curvature(V, F):
@@ -296,3 +297,29 @@ def naive_sectors(mesh, marks):
         for corner in whole:
             sector[corner] = whole
     return {frozenset(corners) for corners in sector.values()}
+
+
+def test_at_corners_it_is_that_of_their_side():
+    """A can: its lids are flat, also where they meet the wall."""
+    mesh = built(*zoo.closed_cylinder(48, 6))
+    is_rim = sharp_edges(mesh, 60.0)
+    V, F = mesh.X[:, :3], mesh.origin.reshape(-1, 3)
+    on_lid = np.ptp(V[F, 2], axis=1) == 0.0
+    arrays = mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge, is_rim
+    found = corner_curvature(*arrays).reshape(-1, 3)
+    radius = np.hypot(*V[:, :2].T).max()
+    assert found[on_lid].max() < 1e-6
+    assert found[~on_lid] == pytest.approx(1.0 / radius, rel=0.15)
+    largest = np.zeros(len(V))
+    np.maximum.at(largest, mesh.origin, found.ravel())
+    assert np.array_equal(largest, largest_curvature(*arrays))
+
+
+def test_a_patch_of_two_flat_faces_has_none():
+    """Their means lie on a line, but for rounding: it was divided by next to nothing."""
+    t = 2 * np.pi * np.arange(8) / 8
+    V, F = prism(np.c_[np.cos(t), np.sin(t)], height=200.0)
+    mesh = built(V, F)
+    is_feature = sharp_edges(mesh, 40.0)
+    found = corner_curvature(mesh.X, mesh.origin, mesh.twin, mesh.vertex_halfedge, is_feature)
+    assert found.max() < 1e-6
