@@ -32,7 +32,7 @@ def guards(monkeypatch):
     return asked
 
 
-MENDED = [(0.05, 0, 0.12, "default"), (0.05, 1, 0.2, "fast")]
+MENDED = [(0.05, 0, 0.12, "default"), (0.05, 2, 0.12, "default")]
 
 
 @pytest.mark.parametrize(("thickness", "seed", "L", "preset"), MENDED)
