@@ -6,14 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import sqrt
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.vocabulary import EQUILATERAL_AREA, LARGEST_MESH, FloatArray, Mesh
+from ..core.vocabulary import EQUILATERAL_AREA, LARGEST_MESH, NONE, FloatArray, Mesh
 from ..errors import OptionError
 from ..features.creases import Creases, judge_edges
 from ..input.constraints import ConstraintMasks, Constraints
 from ..input.prepare import Prepared
 from ..input.recipe import Recipe
+from ..mesh.walk import ends_of
 from ..reference.build import FeaturedReference, build_reference
 from ..reference.clearance import find_gaps
 from ..sizing.adaptive import Adaptive, expected_faces
@@ -127,9 +129,13 @@ class Job:
         return self._sweep([self.prepared.mesh.copy()], self.sizing.L if L is None else L)
 
     def first_length(self, noun: str, wanted: int) -> float:
-        """Return the length that gives so many faces or vertices if all faces are equilateral."""
+        """Return the length that gives so many faces or vertices if all faces are equilateral.
+
+        But no more edges than that on the boundary: along needles nearly all would lie there.
+        """
         faces = wanted if noun == "faces" else 2 * wanted
-        return sqrt(self.size.area / faces / EQUILATERAL_AREA) / self.prepared.scale
+        length = sqrt(self.size.area / faces / EQUILATERAL_AREA)
+        return max(length, _boundary_length(self.prepared.mesh) / wanted) / self.prepared.scale
 
     def find_creases(self, L: Lengths | None) -> Creases:
         """Find the features of the mesh, which gets its lengths."""
@@ -232,6 +238,11 @@ class Job:
             self.recipe.max_deviation,
         )
         return marks, length
+
+
+def _boundary_length(mesh: Mesh) -> float:
+    a, b = ends_of(mesh.origin, np.flatnonzero(mesh.twin == NONE))
+    return float(np.linalg.norm(mesh.X[a, :3] - mesh.X[b, :3], axis=1).sum())
 
 
 def _most_faces(allowed: int) -> int:

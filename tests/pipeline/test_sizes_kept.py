@@ -200,6 +200,15 @@ def test_counts_of_a_closed_mesh_are_exact(wanted, preset):
     assert quality(*by_vertices).min_angle > least
 
 
+@pytest.mark.parametrize("noun", ["n_vertices", "n_faces"])
+def test_a_count_on_a_needle_is_met_from_its_boundary(noun):
+    """By its area alone lengths would be a hundredth: its sides were cut ten thousand times."""
+    needle = [[0.0, 0, 0], [4, 0, 0], [2, 1e-4, 0]], [[0, 1, 2]]
+    result = remesh(*needle, **{noun: 100})
+    assert abs(len(result.V if noun == "n_vertices" else result.F) - 100) <= 1
+    assert sum(sweep.get("split", 0) for sweep in result.report.sweeps) < 1000
+
+
 def test_what_must_stay_stays_for_a_count():
     """Fixed parts are kept, and fewer vertices than they have cannot be met; the report says so."""
     V, F = zoo.upsampled(*zoo.torus(30, 14), noise=0.3)
