@@ -11,7 +11,7 @@ from ..core.vocabulary import DEFAULT_LENGTH_FACTOR
 from ..errors import OptionError
 from ..files.data_files import COMMON_SUFFIXES
 from ..files.mesh_files import MeshFile
-from ..input.options import OPTION_NAMES
+from ..input.options import CLEARANCE, OPTION_NAMES
 from ..measures.quality import quality
 from ..sizing.adaptive import Adaptive
 from .flags import (
@@ -241,7 +241,7 @@ def given_options(options: argparse.Namespace) -> dict[str, Any]:
     }
     if options.feature_angle is None:  # "none" differs from the default
         given["feature_angle"] = None
-    if options.clearance is None:
+    if getattr(options, "clearance", CLEARANCE) is None:
         given["clearance"] = None
     if options.no_project:
         given["project"] = False

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.vocabulary import LARGEST_MESH
 from ..errors import OptionError
-from ..input.options import RemeshOptions, read_options
+from ..input.options import CLEARANCE, RemeshOptions, read_options
 from ..sizing.adaptive import Adaptive, target_lengths
 from .scratch import read_json, remove, write_json
 from .source import Source, digest
@@ -50,6 +50,10 @@ def read_large_options(given: dict[str, Any]) -> RemeshOptions:
         raise OptionError(
             "remesh_large does not take avoid_intersections: a part does not see faces of others "
             "that it may cross"
+        )
+    if options.clearance not in (None, CLEARANCE):
+        raise OptionError(
+            "remesh_large does not take clearance: a part does not see sheets of others that are near"
         )
     if (
         options.project is False

@@ -177,9 +177,10 @@ class Job:
     def _gaps(self, mesh: Mesh, featured: FeaturedReference) -> FloatArray | None:
         """Distances to the next sheet on either side of every face of the input; None if not asked for.
 
-        A number of faces or vertices to be met is a stronger wish than lengths.
+        A number of faces or vertices to be met is a stronger wish than lengths. Without projection there
+        is no tree to look in.
         """
-        if self.recipe.clearance is None or self.plan.count:
+        if self.recipe.clearance is None or self.plan.count or not self.recipe.project:
             return None
         with self.monitor.watch.time("clearance"):
             return find_gaps(featured.reference.tree, mesh, self.parallel)

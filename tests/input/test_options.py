@@ -93,7 +93,7 @@ def test_keywords_flags_and_documentation_are_those_of_the_record():
 # Options that name elements of one mesh come from files; functions have no flag.
 FILES = {"feature_edges", "fixed_vertices", "fixed_faces", "face_labels", "selection"}
 NO_FLAG = {"callback", "max_faces", "preserve", "untangle_angle"}
-IN_PARTS = {"n_faces", "n_vertices", "max_deviation"}  # have no meaning there
+IN_PARTS = {"n_faces", "n_vertices", "max_deviation", "clearance"}  # have no meaning there
 
 
 @pytest.mark.parametrize(
