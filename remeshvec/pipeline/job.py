@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -309,7 +309,8 @@ def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
     job.plan = replace(job.plan, count=goal)
     L = job.first_length(noun, wanted)
     best = None
-    for _ in range(_TRIES):
+    short, long = 0.0, inf  # lengths that gave too many, and too few
+    for attempt in range(_TRIES):
         done = job.run(L)
         count = done.count(noun)
         if best is None or abs(count - wanted) < abs(best.count(noun) - wanted):
@@ -317,7 +318,11 @@ def meet_count(job: Job, noun: str, wanted: int) -> Remeshed:
         held = done.count_held() // (1 if noun == "faces" else 2)
         if abs(count - wanted) <= _CLOSE_ENOUGH * wanted or job.monitor.is_cancelled:
             break
+        short, long = (max(short, L), long) if count > wanted else (short, min(long, L))
         L *= min(2.0, max(0.5, sqrt(max(count - held, 1) / max(wanted - held, 1))))
+        # Where the edges of the input are all alike the number jumps, and tries would go to and fro.
+        if long < inf and short > 0.0 and (attempt > 1 or not short < L < long):
+            L = sqrt(short * long)
     assert best is not None
     count = best.count(noun)
     if abs(count - wanted) < goal.per_edge:

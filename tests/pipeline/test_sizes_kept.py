@@ -209,6 +209,22 @@ def test_a_count_on_a_needle_is_met_from_its_boundary(noun):
     assert sum(sweep.get("split", 0) for sweep in result.report.sweeps) < 1000
 
 
+@pytest.mark.parametrize(("number", "wanted"), [(46, 3547), (145, 3046)])
+def test_a_count_in_a_jump_is_met(number, wanted):
+    """Where edges are all alike the number jumps with the length; tries went to and fro between two."""
+    V, F = zoo.icosphere(4)
+    rng = np.random.default_rng(5)
+    for _ in range(number + 1):
+        towards = rng.normal(size=(6, 3))
+        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+        height, width = rng.uniform(-0.35, 0.5, 6), rng.uniform(2, 8, 6)
+        rng.integers(200, 4000)
+    bumps = zip(towards, height, width, strict=True)
+    radius = 1 + sum(h * np.exp(-w * (1 - V @ t)) for t, h, w in bumps)
+    V = V * np.maximum(radius, 0.3)[:, None]
+    assert len(remesh(V, F, n_vertices=wanted).V) == wanted
+
+
 def test_what_must_stay_stays_for_a_count():
     """Fixed parts are kept, and fewer vertices than they have cannot be met; the report says so."""
     V, F = zoo.upsampled(*zoo.torus(30, 14), noise=0.3)
