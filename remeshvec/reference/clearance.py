@@ -101,8 +101,8 @@ def _find_gaps(span, tree, origin, X, normal, gap):
 
     The faces of a leaf look together: their lines lie in one box.
     """
+    stack = np.empty((2, STACK), np.int64)
     for leaf in range(span[0], span[1]):
-        stack = np.empty((2, STACK), np.int64)
         first = LEAF * leaf
         end = min(first + LEAF, gap.size)
         low, high = _box_of_lines(tree, origin, X, normal, first, end, gap)
